@@ -1,0 +1,77 @@
+"""The whole hardware abstraction on one page: what a camera and an arm are to the rig.
+
+Conventions: SI units; ``T_base_tool`` maps tool coordinates into base coordinates; a twist is
+(v, ω), linear part first, in m/s and rad/s, of the named body in that body's own axes. All
+instants are seconds on the rig's one ``Clock``.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+GreyImage = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One image and the instant it was true."""
+
+    image: GreyImage  # (height, width), grey
+    t_exposure_mid_s: float  # mid-exposure
+    exposure_s: float
+    seq: int  # counts exposures: a gap is a dropped frame
+    stamp_source: str  # "sim", "kernel" or "host"
+
+
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """One measured sample of the arm."""
+
+    t_s: float  # the instant the sample was true
+    T_base_tool: FloatArray  # (4, 4)
+    twist_tool: FloatArray  # (6,) measured, in the tool's own axes
+
+
+class Camera(Protocol):
+    """A source of stamped grey images."""
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The newest frame not returned before, waiting up to ``timeout_s`` on the rig's clock.
+
+        Returns None when no new frame became readable in time; with ``timeout_s=0`` it only
+        looks. Raises OperateError when the device failed for good.
+        """
+        ...
+
+    def close(self) -> None:
+        """Release the device; harmless when repeated."""
+        ...
+
+
+class Arm(Protocol):
+    """An arm that follows tool velocities and reports what it really does."""
+
+    def read_states(self) -> list[ArmState]:
+        """Every sample measured since the last call, oldest first; empty if there is none.
+
+        Raises OperateError when the device failed or its newest sample is too old.
+        """
+        ...
+
+    def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
+        """Follow ``twist_tool`` (6,) from now on; stop by itself ``hold_s`` after this call.
+
+        Raises OperateError when the command cannot be delivered.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Decelerate to standstill as fast as the arm may; returns at once, can be repeated."""
+        ...
+
+    def close(self) -> None:
+        """Stop and release the device; harmless when repeated."""
+        ...
