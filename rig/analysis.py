@@ -1,0 +1,93 @@
+"""What a finished run shows: error against the ideal response, accuracy, motion, geometry."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.ideal import ideal_response, rms_vs_ideal, time_to_within
+from rig.config import RigConfig
+from rig.run_data import ArmTrack, RunData, UpdateTrack
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """One run's series and figures; those that need the true radius are None without it."""
+
+    t_s: FloatArray  # (k,) since the first image used
+    chi: FloatArray  # (k,)
+    radius_m: FloatArray  # (k,)
+    motion_t_s: FloatArray  # (n,) since the first image used
+    sigma2: FloatArray  # (n,) of the measured motion, (m/s)²
+    speed2: FloatArray  # (n,) ‖v‖² of the camera, (m/s)²
+    path_m: FloatArray  # (n, 3) camera in the base frame
+    optical_axes: FloatArray  # (n, 3) in the base frame
+    target_m: FloatArray | None  # (3,) P0 in the base frame, as estimated at the end
+    radius_true_m: float | None
+    z: FloatArray | None  # (k,) 1/R - chi, 1/m
+    z_ideal: FloatArray | None  # (k,)
+    rms_vs_ideal: float | None  # of |z(0)|
+    time_to_1pct_s: float | None  # also None when it was never reached for good
+    relative_error: float | None
+
+
+def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> Analysis:
+    """Compute the series and figures of one run; ``radius_true_m`` serves the error figures only."""
+    updates, arm = data.update_track(), data.arm_track()
+    start_s = float(updates.t_s[0]) if len(updates.t_s) else 0.0
+    during = arm.t_s >= start_s
+    sigma2 = _sigma2(arm, updates)
+    t_s = updates.t_s - start_s
+    motion_t_s = arm.t_s - start_s
+    z = z_ideal = rms = to_1pct = relative = None
+    with np.errstate(divide="ignore"):
+        radius_m = 1.0 / updates.chi
+    if radius_true_m is not None and len(t_s) > 1:
+        z = 1.0 / radius_true_m - updates.chi
+        z_ideal = ideal_response(
+            motion_t_s, sigma2, config.estimator.alpha, config.estimator.damping, float(z[0]), t_s
+        )
+        rms = rms_vs_ideal(t_s, z, z_ideal)
+        relative_errors = radius_m / radius_true_m - 1.0
+        to_1pct = time_to_within(t_s, relative_errors, 0.01)
+        relative = float(relative_errors[-1])
+    return Analysis(
+        t_s=t_s,
+        chi=updates.chi,
+        radius_m=radius_m,
+        motion_t_s=motion_t_s[during],
+        sigma2=sigma2[during],
+        speed2=np.sum(arm.twist_camera[during, :3] ** 2, axis=1),
+        path_m=arm.T_base_camera[during, :3, 3],
+        optical_axes=arm.T_base_camera[during, :3, 2],
+        target_m=_target_base(arm, updates, radius_m),
+        radius_true_m=radius_true_m,
+        z=z,
+        z_ideal=z_ideal,
+        rms_vs_ideal=rms,
+        time_to_1pct_s=to_1pct,
+        relative_error=relative,
+    )
+
+
+def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:
+    """σ1² at the arm's stamps: ‖v‖² (sphere), less (aᵀv)² with the measured axis (eq. 21)."""
+    v = arm.twist_camera[:, :3]
+    speed2: FloatArray = np.sum(v**2, axis=1)
+    if updates.axis is None:
+        return speed2
+    axis = np.column_stack([np.interp(arm.t_s, updates.t_s, updates.axis[:, i]) for i in range(3)])
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    return np.asarray(speed2 - np.sum(axis * v, axis=1) ** 2)
+
+
+def _target_base(arm: ArmTrack, updates: UpdateTrack, radius_m: FloatArray) -> FloatArray | None:
+    """P0 = s R̂ of the last image, carried into the base frame by the nearest measured pose."""
+    if len(updates.t_s) == 0 or len(arm.t_s) == 0 or not np.isfinite(radius_m[-1]):
+        return None
+    nearest = int(np.argmin(np.abs(arm.t_s - updates.t_s[-1])))
+    T_base_camera = arm.T_base_camera[nearest]
+    P0 = updates.s[-1] * radius_m[-1]
+    return np.asarray(T_base_camera[:3, :3] @ P0 + T_base_camera[:3, 3])

@@ -1,0 +1,35 @@
+"""The ``rig`` command: registers the commands and turns errors into exit statuses."""
+
+import sys
+
+import typer
+
+from drivers.errors import RigError
+from rig.commands.measure import measure
+from rig.commands.reproduce import reproduce
+from rig.commands.run import run
+from rig.exit_codes import HELP, ExitCode, exit_code_of
+
+app = typer.Typer(
+    name="rig",
+    help="Active structure from motion: moves a camera and reports the radius and the 3D pose "
+    "of a ball or a pipe.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command(epilog=HELP)(run)
+app.command()(measure)
+app.command(epilog=HELP)(reproduce)
+
+
+def main() -> None:
+    """Run the command line; an error of the rig is one line on stderr and an exit status."""
+    try:
+        app()
+    except RigError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(exit_code_of(error))
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)

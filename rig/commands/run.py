@@ -1,0 +1,97 @@
+"""``rig run``: the main job."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from rig.commands.options import (
+    AsJson,
+    Assignments,
+    RigFile,
+    Seed,
+    Target,
+    exit_code_of_run,
+    view_for,
+    warn,
+)
+from rig.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rig.run import RunResult
+
+# Below this the radius is the observer's, above it is still partly the first guess.
+_SETTLED = 0.01
+
+
+def run(
+    target: Target,
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(help="Seconds from the first image used to the end (run.duration_s)."),
+    ] = None,
+    until_converged: Annotated[
+        bool, typer.Option("--until-converged", help="End as soon as the estimate has settled.")
+    ] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Run the simulated rig on the wall clock.")
+    ] = False,
+    seed: Seed = None,
+    as_json: AsJson = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The run directory to make; default: a new dated one below runs/."),
+    ] = None,
+) -> None:
+    """Move the camera, estimate the target's radius and pose, write a run directory."""
+    from rig.config_load import load_config
+    from rig.records import make_run_dir, write_summary
+    from rig.report import write_report
+    from rig.run import execute
+    from rig.stop_request import StopRequest
+    from rig.summary import JSON_KEYS, table
+
+    extra = list(assignments or [])
+    extra += [] if duration is None else [f"run.duration_s={duration!r}"]
+    extra += [] if seed is None else [f"sim.seed={seed}"]
+    extra += ["run.until_converged=true"] if until_converged else []
+    config = load_config(target, rig, extra)
+    run_dir = make_run_dir(out, target)
+    console = Console(stderr=as_json)
+    with StopRequest() as stop_requested:
+        result = execute(config, target, run_dir, realtime, view_for(console), stop_requested)
+    write_summary(run_dir, result.summary)
+    if as_json:
+        print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
+    console.print(table(result.summary))
+    write_report(
+        run_dir / "report.png",
+        f"{target}, {config.name}",
+        result.analysis,
+        result.outcome.data,
+        result.intrinsics,
+    )
+    _explain(result)
+    code = exit_code_of_run(result.outcome, result.summary)
+    if code is not ExitCode.OK:
+        raise typer.Exit(code)
+
+
+def _explain(result: "RunResult") -> None:
+    """Say on stderr what a number alone would hide."""
+    outcome = result.outcome
+    if outcome.error is not None:
+        warn(f"error: {outcome.error}")
+    elif result.summary["radius_m"] is None:
+        warn(f"no radius: {outcome.ending.value}; {outcome.target_state}")
+    elif outcome.remaining_fraction > _SETTLED:
+        warn(
+            f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
+            "error is left; run longer, faster or with a larger estimator.alpha"
+        )
+    if not outcome.at_rest:
+        warn("warning: the arm was not seen at rest after its stop; check it before coming near")

@@ -1,0 +1,54 @@
+"""Whether the estimate has settled, judged without knowing the truth."""
+
+import numpy as np
+
+from estimator.gain import damping_rates
+from estimator.second_order import exact_step
+from rig.config import RigConfig
+from rig.run_data import RunData
+
+_WINDOW_S = 1.0
+
+
+class Convergence:
+    """Follows the transient that (5) predicts for the measured motion, and the drift of R̂.
+
+    The transient starts at 1 with the first image and is integrated with the σ1² of each
+    interval; ``remaining_fraction`` is its envelope sqrt(z² + α w² / σ1²), w = −ż/α, which an
+    underdamped response does not take through zero.
+    """
+
+    def __init__(self, config: RigConfig, data: RunData) -> None:
+        self._estimator = config.estimator
+        self._fraction = config.run.converged_fraction
+        self._data = data
+        self._used = 0
+        self._z, self._w = 1.0, 0.0
+        self.remaining_fraction = 1.0
+
+    def update(self) -> None:
+        """Take the updates made since the last call into account."""
+        updates = self._data.updates
+        for index in range(max(self._used, 1), len(updates)):
+            duration_s = updates[index].t_s - updates[index - 1].t_s
+            self._advance(duration_s, self._data.sigma2_at(index))
+        self._used = len(updates)
+
+    def reached(self) -> bool:
+        """Whether the rest of the transient and the drift over the last second are both small."""
+        updates = self._data.updates
+        if self.remaining_fraction > self._fraction:
+            return False
+        last = updates[-1]
+        recent = [u.chi for u in updates if u.t_s >= last.t_s - _WINDOW_S]
+        return bool(np.ptp(recent) <= self._fraction * abs(last.chi))
+
+    def _advance(self, duration_s: float, sigma2: float) -> None:
+        alpha = self._estimator.alpha
+        c = damping_rates(np.array(np.sqrt(sigma2)), alpha, self._estimator.damping)
+        step = exact_step(alpha, np.array(sigma2), c, np.array(duration_s))
+        z, w = self._z, self._w
+        self._z = float(step.zz * z + step.zw * w)
+        self._w = float(step.wz * z + step.ww * w)
+        kinetic = alpha * self._w**2 / sigma2 if sigma2 > 0 else 0.0
+        self.remaining_fraction = min(1.0, float(np.sqrt(self._z**2 + kinetic)))

@@ -1,0 +1,91 @@
+"""Arm samples and sightings in, the newest estimate out: each image used at its own instant."""
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.interfaces import ArmState
+from estimator.estimate import Correction, Estimate, Estimator
+from estimator.twist_history import TwistHistory
+from rig.records import RunLog
+from rig.run_data import RunData, Snapshot
+from rig.vision import Sighting
+
+FloatArray = NDArray[np.float64]
+
+
+class Fusion:
+    """Keeps the estimator's state at the last image's exposure and predicts from there to now."""
+
+    def __init__(
+        self, estimator: Estimator, data: RunData, log: RunLog, max_extrapolation_s: float
+    ) -> None:
+        self._estimator = estimator
+        self._camera_from_tool = data.camera_from_tool
+        self._motion = TwistHistory(max_extrapolation_s=max_extrapolation_s)
+        self._data = data
+        self._log = log
+        # Sightings wait here until the arm has reported the motion up to their exposure.
+        self._waiting: deque[Sighting] = deque()
+        self.state: ArmState | None = None
+        self.last_feature_s: float | None = None
+        self.reason = "no image arrived yet"
+
+    def add_states(self, states: list[ArmState]) -> None:
+        """Record arm samples and the camera's motion they imply."""
+        for state in states:
+            self._motion.append(state.t_s, self._camera_from_tool @ state.twist_tool)
+            self._data.arm_states.append(state)
+            self._log.arm(state)
+            self.state = state
+
+    def add_sightings(self, sightings: list[Sighting], now_s: float) -> None:
+        """Record sightings; those with a feature will correct the estimate."""
+        for sighting in sightings:
+            self._data.add_frame(sighting.frame.seq, sighting.measurement.found)
+            self._log.frame(sighting, now_s)
+            if sighting.measurement.found:
+                self._waiting.append(sighting)
+            else:
+                self.reason = sighting.measurement.reason
+
+    def advance(self, now_s: float) -> Estimate | None:
+        """Use every sighting whose motion is known, then predict to ``now_s``.
+
+        Returns None before the first feature.
+        """
+        while self._waiting and self._covered(self._waiting[0].frame.t_exposure_mid_s):
+            self._correct(self._waiting.popleft())
+        if self.last_feature_s is None:
+            return None
+        estimate = self._estimator.predict(now_s, self._motion)
+        self._log.estimate("estimate", estimate)
+        return estimate
+
+    def camera_speed_m_s(self) -> float:
+        """The camera's newest measured speed."""
+        if self.state is None:
+            return 0.0
+        return float(np.linalg.norm((self._camera_from_tool @ self.state.twist_tool)[:3]))
+
+    def _covered(self, t_s: float) -> bool:
+        return self.state is not None and self.state.t_s >= t_s
+
+    def _correct(self, sighting: Sighting) -> None:
+        feature, t_s = sighting.measurement.feature, sighting.frame.t_exposure_mid_s
+        assert feature is not None  # only found sightings wait
+        if t_s < self._data.arm_states[0].t_s:
+            return  # exposed before the arm's first sample: the motion since is unknown
+        correction = self._estimator.correct(feature, t_s, self._motion)
+        if correction is Correction.STALE:
+            self._log.event(t_s, "stale image", f"frame {sighting.frame.seq} was not used")
+            return
+        if correction is Correction.RESTARTED:
+            self._log.event(t_s, "estimator restarted", "the target was out of sight too long")
+        update = self._estimator.estimate
+        assert update is not None  # it has just been corrected
+        self.last_feature_s = t_s
+        self._data.updates.append(update)
+        self._data.add_snapshot(Snapshot(t_s, sighting.frame.image, feature))
+        self._log.estimate("update", update)

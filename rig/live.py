@@ -1,0 +1,149 @@
+"""What a person sees while it runs: a table that updates in place, or a plain line a second."""
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Protocol, Self
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from rig.loop import LiveStatus
+
+_REFRESH_S = 0.1
+_LINE_EVERY_S = 1.0
+
+
+class View(Protocol):
+    """Shows the run's state; called every tick, so it must be cheap."""
+
+    def show(self, status: LiveStatus) -> None:
+        """Take the newest state."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None: ...
+
+
+class Rates:
+    """Frame and tick rates over the time since the last reading."""
+
+    def __init__(self) -> None:
+        self._at = (0.0, 0, 0)
+        self.camera_fps = float("nan")
+        self.loop_hz = float("nan")
+
+    def update(self, status: LiveStatus) -> None:
+        """Take a reading."""
+        t_s, frames, ticks = self._at
+        span_s = status.elapsed_s - t_s
+        if span_s > 0:
+            self.camera_fps = (status.frames - frames) / span_s
+            self.loop_hz = (status.ticks - ticks) / span_s
+        self._at = (status.elapsed_s, status.frames, status.ticks)
+
+
+class QuietView:
+    """Shows nothing: for a run that is one of many."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        return None
+
+    def show(self, status: LiveStatus) -> None:
+        """Take the state and drop it."""
+
+
+class PlainView:
+    """One line a second of the run's own time, for pipes and logs."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._rates = Rates()
+        self._next_s = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        return None
+
+    def show(self, status: LiveStatus) -> None:
+        """Print when the next second has begun."""
+        if status.elapsed_s < self._next_s:
+            return
+        self._next_s += _LINE_EVERY_S
+        self._rates.update(status)
+        cells = [f"{name} {value}" for name, value in rows(status, self._rates)]
+        self._console.print(f"t {status.elapsed_s:5.2f} s  " + "  ".join(cells), highlight=False)
+
+
+class TerminalView:
+    """A table on the terminal that updates in place ten times a second."""
+
+    def __init__(self, console: Console, now_s: Callable[[], float]) -> None:
+        self._live = Live(console=console, auto_refresh=False, transient=True)
+        self._now_s = now_s
+        self._rates = Rates()
+        self._next_s = float("-inf")
+
+    def __enter__(self) -> Self:
+        self._live.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._live.__exit__(kind, error, traceback)
+
+    def show(self, status: LiveStatus) -> None:
+        """Redraw when a tenth of a second of wall time has passed."""
+        if self._now_s() < self._next_s:
+            return
+        self._next_s = self._now_s() + _REFRESH_S
+        self._rates.update(status)
+        table = Table(title=f"t = {status.elapsed_s:.2f} s", show_header=False, min_width=56)
+        for name, value in rows(status, self._rates):
+            table.add_row(name, value)
+        self._live.update(table, refresh=True)
+
+
+def rows(status: LiveStatus, rates: Rates) -> list[tuple[str, str]]:
+    """The names and values that both views show."""
+    estimate = status.estimate
+    if estimate is None or estimate.radius_m is None:
+        radius, residual = "–", "–"
+    else:
+        radius = f"{estimate.radius_m * 1e3:.3f} mm"
+        residual = f"{estimate.residual:.1e}"
+    return [
+        ("R", radius),
+        ("residual", residual),
+        ("transient left", f"{100 * status.remaining_fraction:.1f} %"),
+        ("camera", f"{rates.camera_fps:.1f} fps ({status.frames_lost} lost)"),
+        ("loop", f"{rates.loop_hz:.1f} Hz ({status.overruns} overruns)"),
+        ("speed", f"{status.speed_m_s * 1e3:.1f} mm/s"),
+        ("limited by", ", ".join(status.limited_by) or "nothing"),
+        ("target", status.target_state),
+    ]

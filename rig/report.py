@@ -1,0 +1,118 @@
+"""``report.png``: the panels of the paper's figures for one run."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")  # a file, on machines without a screen too
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from mpl_toolkits.mplot3d import Axes3D
+
+from estimator.image.intrinsics import Intrinsics
+from estimator.image.outline import outline_pixels
+from rig.analysis import Analysis
+from rig.run_data import RunData, Snapshot
+
+MEASURED, IDEAL = "#1f5fa8", "black"
+
+
+def write_report(
+    path: Path, title: str, analysis: Analysis, data: RunData, intrinsics: Intrinsics
+) -> None:
+    """Draw all panels of one run into ``path`` (PNG)."""
+    figure = plt.figure(figsize=(15, 9), layout="constrained")
+    figure.suptitle(title)
+    grid = figure.add_gridspec(2, 3)
+    draw_transient(figure.add_subplot(grid[0, 0]), analysis)
+    draw_sigma2(figure.add_subplot(grid[0, 1]), analysis)
+    draw_speed2(figure.add_subplot(grid[0, 2]), analysis)
+    draw_radius(figure.add_subplot(grid[1, 0]), analysis)
+    path_axes = figure.add_subplot(grid[1, 1], projection="3d")
+    assert isinstance(path_axes, Axes3D)
+    draw_path(path_axes, analysis)
+    draw_image(figure.add_subplot(grid[1, 2]), data.newest_snapshot, intrinsics)
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
+def draw_transient(
+    axes: Axes, analysis: Analysis, label: str = "z", colour: str = MEASURED
+) -> None:
+    """The estimation error z(t) = 1/R − χ̂ with the response (5) promises, as in figs. 3a, 4, 5c."""
+    if analysis.z is None or analysis.z_ideal is None:
+        axes.plot(analysis.t_s, analysis.chi, color=colour, label="χ̂")
+        axes.set(title="estimate χ̂ (true radius unknown)", xlabel="t [s]", ylabel="χ̂ [1/m]")
+        return
+    axes.plot(analysis.t_s, analysis.z, color=colour, label=label)
+    axes.plot(analysis.t_s, analysis.z_ideal, "--", color=IDEAL, linewidth=1)
+    axes.axhline(0.0, color="grey", linewidth=0.5)
+    axes.set(title="estimation error z (dashed: ideal)", xlabel="t [s]", ylabel="z [1/m]")
+    axes.legend()
+
+
+def draw_radius(axes: Axes, analysis: Analysis) -> None:
+    """The estimated radius over time, with the true one and ± 1 % where it is known."""
+    axes.plot(analysis.t_s, analysis.radius_m * 1e3, color=MEASURED, label="R̂")
+    final_mm = float(analysis.radius_m[-1]) * 1e3 if len(analysis.radius_m) else np.nan
+    if analysis.radius_true_m is not None:
+        true_mm = final_mm = analysis.radius_true_m * 1e3
+        axes.axhline(true_mm, color=IDEAL, linewidth=1, linestyle="--", label="true")
+        axes.axhspan(0.99 * true_mm, 1.01 * true_mm, color="green", alpha=0.15, label="± 1 %")
+    if np.isfinite(final_mm):
+        axes.set_ylim(0.4 * final_mm, 2.2 * final_mm)
+    axes.set(title="radius", xlabel="t [s]", ylabel="R̂ [mm]")
+    axes.legend()
+
+
+def draw_sigma2(axes: Axes, analysis: Analysis, label: str = "σ₁²", colour: str = MEASURED) -> None:
+    """σ1²(t) of the measured motion, as in fig. 5b."""
+    axes.plot(analysis.motion_t_s, analysis.sigma2, color=colour, label=label, linewidth=1)
+    axes.set(title="σ₁²", xlabel="t [s]", ylabel="σ₁² [m²/s²]")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+
+
+def draw_speed2(
+    axes: Axes, analysis: Analysis, label: str = "‖v‖²", colour: str = MEASURED
+) -> None:
+    """‖v‖² of the measured camera velocity, as in fig. 5a."""
+    axes.plot(analysis.motion_t_s, analysis.speed2, color=colour, label=label, linewidth=1)
+    axes.set(title="‖v‖²", xlabel="t [s]", ylabel="‖v‖² [m²/s²]")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+
+
+def draw_path(
+    axes: Axes3D, analysis: Analysis, label: str = "camera", colour: str = MEASURED
+) -> None:
+    """The camera's path in the base frame with arrows along its optical axis (figs. 3b, 5d)."""
+    p, z = analysis.path_m, analysis.optical_axes
+    if len(p) == 0:
+        return
+    axes.plot(p[:, 0], p[:, 1], p[:, 2], color=colour, label=label)
+    some = np.linspace(0, len(p) - 1, 9).astype(int)
+    length_m = 0.3 * float(np.ptp(p, axis=0).max()) + 1e-3
+    axes.quiver(*p[some].T, *z[some].T, length=length_m, color=colour, linewidth=1)
+    target = analysis.target_m
+    if target is not None:
+        axes.scatter(*target, color="black", s=20)
+    axes.set_aspect("equal")
+    axes.set(title="camera path", xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+
+
+def draw_image(axes: Axes, snapshot: Snapshot | None, intrinsics: Intrinsics) -> None:
+    """The newest image with the fitted outline."""
+    axes.set_axis_off()
+    if snapshot is None:
+        axes.set_title("the target was never measured")
+        return
+    height, width = snapshot.image.shape
+    axes.imshow(snapshot.image, cmap="gray", vmin=0, vmax=255)
+    for line in outline_pixels(snapshot.feature, intrinsics, (width, height)):
+        axes.plot(line[:, 0], line[:, 1], color="#ff5533", linewidth=1.2)
+    axes.set(title=f"image at t = {snapshot.t_s:.2f} s with the fitted outline")
+    axes.set_xlim(-0.5, width - 0.5)
+    axes.set_ylim(height - 0.5, -0.5)

@@ -1,0 +1,121 @@
+"""The run in one object: what ``--json`` prints and the final table shows."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis import Analysis
+from rig.config import RigConfig, TargetKind
+from rig.loop import Ending, RunOutcome
+from rig.records import Json
+
+# What `rig run --json` prints, in this order; summary.json holds more.
+JSON_KEYS = (
+    "target",
+    "radius_m",
+    "radius_true_m",
+    "relative_error",
+    "rms_vs_ideal",
+    "time_to_1pct_s",
+    "frames",
+    "frames_lost",
+    "ticks",
+    "overruns",
+    "tick_late_p99_s",
+    "sim_s",
+    "wall_s",
+    "renderer",
+    "seed",
+    "run_dir",
+)
+_WITH_RADIUS = (Ending.TIME, Ending.CONVERGED, Ending.INTERRUPTED)
+
+
+def radius_obtained(outcome: RunOutcome, analysis: Analysis) -> float | None:
+    """The final radius, or None when the run gave none that may be used."""
+    if outcome.ending not in _WITH_RADIUS or len(analysis.radius_m) == 0:
+        return None
+    if not outcome.target_state.startswith("tracking"):
+        return None
+    radius_m = float(analysis.radius_m[-1])
+    return radius_m if np.isfinite(radius_m) and radius_m > 0 else None
+
+
+def summarise(
+    target: TargetKind,
+    outcome: RunOutcome,
+    analysis: Analysis,
+    config: RigConfig,
+    renderer: str | None,
+    wall_s: float,
+    run_dir: Path,
+) -> dict[str, Json]:
+    """All figures of a run; None where a figure is unknown or was not reached."""
+    radius_m = radius_obtained(outcome, analysis)
+    position = None if analysis.target_m is None or radius_m is None else analysis.target_m.tolist()
+    run_s = outcome.ended_s - outcome.started_s
+    return {
+        "target": target,
+        "radius_m": radius_m,
+        "radius_true_m": analysis.radius_true_m,
+        "relative_error": None if radius_m is None else analysis.relative_error,
+        "rms_vs_ideal": analysis.rms_vs_ideal,
+        "time_to_1pct_s": analysis.time_to_1pct_s,
+        "frames": outcome.data.frames,
+        "frames_lost": outcome.data.frames_lost,
+        "ticks": outcome.stats.ticks,
+        "overruns": outcome.stats.overruns,
+        "tick_late_p99_s": outcome.stats.late_p99_s(),
+        "sim_s": run_s,
+        "wall_s": wall_s,
+        "renderer": renderer,
+        "seed": config.sim.seed,
+        "run_dir": str(run_dir),
+        "ending": outcome.ending.value,
+        "error": None if outcome.error is None else str(outcome.error),
+        "target_state": outcome.target_state,
+        "arm_at_rest": outcome.at_rest,
+        "frames_dropped": outcome.data.frames_dropped,
+        "transient_left": outcome.remaining_fraction,
+        "target_base_m": position,
+    }
+
+
+def table(summary: Mapping[str, Json]) -> Table:
+    """The final table."""
+    out = Table(title=f"{summary['target']}: {summary['ending']}", show_header=False)
+    position = summary["target_base_m"]
+    where = "–"
+    if isinstance(position, list):
+        where = " ".join(_number(value, "{:.4f}") for value in position) + " m (base)"
+    for name, value in [
+        ("radius", _number(summary["radius_m"], "{:.4f} mm", 1e3)),
+        ("true radius", _number(summary["radius_true_m"], "{:.4f} mm", 1e3)),
+        ("relative error", _number(summary["relative_error"], "{:+.3f} %", 1e2)),
+        ("position", where),
+        ("rms from the ideal response", _number(summary["rms_vs_ideal"], "{:.3f} % of z(0)", 1e2)),
+        ("transient left", _number(summary["transient_left"], "{:.2f} %", 1e2)),
+        ("time to stay within ± 1 %", _number(summary["time_to_1pct_s"], "{:.2f} s")),
+        (
+            "frames",
+            f"{summary['frames']} received, {summary['frames_lost']} without an outline, "
+            f"{summary['frames_dropped']} dropped by the camera",
+        ),
+        ("ticks", f"{summary['ticks']}, {summary['overruns']} overruns"),
+        ("tick lateness, 99 %", _number(summary["tick_late_p99_s"], "{:.3f} ms", 1e3)),
+        (
+            "time",
+            f"{_number(summary['sim_s'], '{:.2f} s')} of the rig in "
+            f"{_number(summary['wall_s'], '{:.2f} s')}",
+        ),
+        ("renderer, seed", f"{summary['renderer'] or '–'}, {summary['seed']}"),
+        ("run directory", str(summary["run_dir"])),
+    ]:
+        out.add_row(name, value)
+    return out
+
+
+def _number(value: Json, pattern: str, factor: float = 1.0) -> str:
+    return pattern.format(value * factor) if isinstance(value, int | float) else "–"
