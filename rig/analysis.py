@@ -34,10 +34,11 @@ class Analysis:
 
 
 def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> Analysis:
-    """Compute the series and figures of one run; ``radius_true_m`` serves the error figures only."""
+    """The series and figures of one run; ``radius_true_m`` serves the error figures only."""
     updates, arm = data.update_track(), data.arm_track()
     start_s = float(updates.t_s[0]) if len(updates.t_s) else 0.0
-    during = arm.t_s >= start_s
+    end_s = float(updates.t_s[-1]) if len(updates.t_s) else 0.0
+    during = (arm.t_s >= start_s) & (arm.t_s <= end_s)
     sigma2 = _sigma2(arm, updates)
     t_s = updates.t_s - start_s
     motion_t_s = arm.t_s - start_s

@@ -93,7 +93,8 @@ class PlainView:
         self._next_s += _LINE_EVERY_S
         self._rates.update(status)
         cells = [f"{name} {value}" for name, value in rows(status, self._rates)]
-        self._console.print(f"t {status.elapsed_s:5.2f} s  " + "  ".join(cells), highlight=False)
+        line = f"t {status.elapsed_s:5.2f} s  " + "  ".join(cells)
+        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 class TerminalView:

@@ -104,7 +104,7 @@ class RunLog:
         )
 
     def estimate(self, kind: str, estimate: Estimate) -> None:
-        """The estimator's state after an image (``update``) or predicted to a tick (``estimate``)."""
+        """The state after an image (``kind`` update) or predicted to a tick (estimate)."""
         self._write(
             kind,
             estimate.t_s,

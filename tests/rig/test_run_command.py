@@ -1,0 +1,233 @@
+"""``rig run`` as a user meets it: what it prints, what it leaves behind, how it exits."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rig.cli import main
+from rig.summary import JSON_KEYS
+
+RASTER = ("--set", "sim.renderer=raster")
+
+
+def rig(*arguments: str, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Run the command line in this process; its exit status."""
+    monkeypatch.setattr(sys, "argv", ["rig", *arguments])
+    with pytest.raises(SystemExit) as left:
+        main()
+    return int(left.value.code or 0)
+
+
+def run_json(
+    *arguments: str,
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    status: int = 0,
+) -> dict:
+    capsys.readouterr()
+    code = rig("run", "--json", "--out", str(out), *RASTER, *arguments, monkeypatch=monkeypatch)
+    printed = capsys.readouterr()
+    assert code == status, printed.err
+    return json.loads(printed.out)  # exactly one object, nothing else
+
+
+@pytest.mark.parametrize("target", ["sphere", "cylinder"])
+def test_the_main_job_finds_the_radius_from_pixels(
+    target: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result = run_json("--target", target, out=tmp_path, monkeypatch=monkeypatch, capsys=capsys)
+    assert tuple(result) == JSON_KEYS
+    assert abs(result["relative_error"]) < 2e-3
+    assert result["radius_m"] == pytest.approx(result["radius_true_m"], rel=2e-3)
+    assert result["rms_vs_ideal"] < 5e-3
+    assert 1.0 < result["time_to_1pct_s"] < 5.0
+    assert result["frames"] > 150
+    assert result["frames_lost"] == 0
+    assert result["overruns"] == 0
+    assert result["renderer"] == "raster"
+    assert json.loads((tmp_path / "summary.json").read_text())["radius_m"] == result["radius_m"]
+    report = cv2.imread(str(tmp_path / "report.png"))
+    assert report.shape[0] > 500 and len(np.unique(report)) > 50
+    assert (tmp_path / "config.yaml").is_file()
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results, logs = [], []
+    for name, seed in (("a", "3"), ("b", "3"), ("c", "4")):
+        results.append(
+            run_json(
+                *("--target", "sphere", "--seed", seed, "--duration", "1.5"),
+                out=tmp_path / name,
+                monkeypatch=monkeypatch,
+                capsys=capsys,
+            )
+        )
+        logs.append((tmp_path / name / "log.jsonl").read_bytes())
+        assert results[-1]["seed"] == int(seed)
+        del results[-1]["wall_s"], results[-1]["run_dir"]
+    assert results[0] == results[1]
+    assert logs[0] == logs[1]
+    assert results[0]["radius_m"] != results[2]["radius_m"]
+
+
+def test_a_stored_configuration_repeats_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("--target", "sphere", "--duration", "1", "--set", "estimator.alpha=6000")
+    first = run_json(*arguments, out=tmp_path / "a", monkeypatch=monkeypatch, capsys=capsys)
+    again = run_json(
+        *("--target", "sphere", "--rig", str(tmp_path / "a" / "config.yaml")),
+        out=tmp_path / "b",
+        monkeypatch=monkeypatch,
+        capsys=capsys,
+    )
+    assert again["radius_m"] == first["radius_m"]
+
+
+@pytest.mark.parametrize(
+    ("target", "radius"), [("sphere", "0.013"), ("sphere", "0.03"), ("cylinder", "0.03")]
+)
+def test_another_radius_is_found_as_well(
+    target: str,
+    radius: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result = run_json(
+        *("--target", target, "--set", f"sim.{target}.radius_m={radius}"),
+        out=tmp_path,
+        monkeypatch=monkeypatch,
+        capsys=capsys,
+    )
+    assert result["radius_true_m"] == float(radius)
+    assert abs(result["relative_error"]) < 5e-3
+
+
+@pytest.mark.parametrize("target", ["sphere", "cylinder"])
+def test_late_and_missing_images_cost_less_than_two_thousandths(
+    target: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    easy, hard = (
+        run_json(
+            *("--target", target, "--duration", "7", *settings),
+            out=tmp_path / name,
+            monkeypatch=monkeypatch,
+            capsys=capsys,
+        )
+        for name, settings in (
+            ("easy", ()),
+            (
+                "hard",
+                (
+                    *("--set", "sim.camera.latency_s=0.08"),
+                    *("--set", "sim.camera.latency_jitter_s=0.01"),
+                    *("--set", "sim.camera.drop_probability=0.1"),
+                ),
+            ),
+        )
+    )
+    assert hard["frames"] < 0.95 * easy["frames"]
+    assert abs(hard["radius_m"] / easy["radius_m"] - 1.0) < 2e-3
+    assert abs(hard["relative_error"]) < 2e-3
+
+
+def test_a_target_out_of_view_ends_with_its_own_status_and_no_radius(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = run_json(
+        *("--target", "sphere", "--set", "sim.sphere.start.offset_px=[900, 0]"),
+        out=tmp_path,
+        monkeypatch=monkeypatch,
+        capsys=capsys,
+        status=4,
+    )
+    assert result["radius_m"] is None
+    assert result["relative_error"] is None
+
+
+def test_leaving_the_workspace_is_a_safety_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = run_json(
+        *("--target", "sphere", "--set", "safety.workspace_min_m=[-2, -2, 1.5]"),
+        out=tmp_path,
+        monkeypatch=monkeypatch,
+        capsys=capsys,
+        status=5,
+    )
+    assert result["radius_m"] is None
+    assert "outside the workspace" in json.loads((tmp_path / "summary.json").read_text())["error"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--target", "sphere", "--set", "estimator.gain=1"), "alpha"),
+        (("--target", "sphere", "--set", "sim.sphere.radius_m=-1"), "sim.sphere.radius_m"),
+        (("--target", "sphere", "--duration", "-1"), "run.duration_s"),
+        (("--target", "sphere", "--rig", "nowhere.yaml"), "nowhere.yaml"),
+        (("--target", "cube"), "cube"),
+        ((), "--target"),
+    ],
+)
+def test_wrong_usage_exits_2_says_why_and_leaves_nothing_behind(
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "run"
+    code = rig("run", "--json", "--out", str(out), *arguments, monkeypatch=monkeypatch)
+    printed = capsys.readouterr()
+    assert code == 2
+    assert printed.out == ""
+    assert words in printed.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_in_real_time_ramps_the_arm_to_rest(number: int, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from rig.cli import main; main()", "run", "--target", "sphere"]
+        + ["--realtime", "--duration", "60", "--json", "--out", str(tmp_path), *RASTER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if "target tracking" in line:  # it moves by now
+                break
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert json.loads(output)["target"] == "sphere"
+    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert lines[-1]["kind"] == "event" and lines[-1]["detail"] == "interrupted"
+    speeds = [np.linalg.norm(line["twist_tool"][:3]) for line in lines if line["kind"] == "arm"]
+    assert max(speeds) > 0.03
+    assert speeds[-1] < 2e-3
+    allowed = [line["allowed"] for line in lines if line["kind"] == "command"]
+    assert not np.any(allowed[-1])
