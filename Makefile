@@ -15,6 +15,11 @@ test: $(VENV)/.installed-dev
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m slow
 
+test-lowest:
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/python -m pip install --quiet -e '.[test]' -c tests/lowest.txt
+	.venv-lowest/bin/python -m pytest
+
 bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.bench_limb
 	$(BIN)/python -m benchmarks.bench_sim
@@ -27,7 +32,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/lint-imports
 
 clean:
-	rm -rf $(VENV) dist build
+	rm -rf $(VENV) .venv-lowest dist build
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)

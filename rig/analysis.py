@@ -25,6 +25,7 @@ class Analysis:
     path_m: FloatArray  # (n, 3) camera in the base frame
     optical_axes: FloatArray  # (n, 3) in the base frame
     target_m: FloatArray | None  # (3,) P0 in the base frame, as estimated at the end
+    target_axis: FloatArray | None  # (3,) in the base frame, cylinder only
     radius_true_m: float | None
     z: FloatArray | None  # (k,) 1/R - chi, 1/m
     z_ideal: FloatArray | None  # (k,)
@@ -54,6 +55,7 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         relative_errors = radius_m / radius_true_m - 1.0
         to_1pct = time_to_within(t_s, relative_errors, 0.01)
         relative = float(relative_errors[-1])
+    target_m, target_axis = _target_base(arm, updates, radius_m)
     return Analysis(
         t_s=t_s,
         chi=updates.chi,
@@ -63,7 +65,8 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         speed2=np.sum(arm.twist_camera[during, :3] ** 2, axis=1),
         path_m=arm.T_base_camera[during, :3, 3],
         optical_axes=arm.T_base_camera[during, :3, 2],
-        target_m=_target_base(arm, updates, radius_m),
+        target_m=target_m,
+        target_axis=target_axis,
         radius_true_m=radius_true_m,
         z=z,
         z_ideal=z_ideal,
@@ -84,11 +87,13 @@ def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:
     return np.asarray(speed2 - np.sum(axis * v, axis=1) ** 2)
 
 
-def _target_base(arm: ArmTrack, updates: UpdateTrack, radius_m: FloatArray) -> FloatArray | None:
-    """P0 = s R̂ of the last image, carried into the base frame by the nearest measured pose."""
+def _target_base(
+    arm: ArmTrack, updates: UpdateTrack, radius_m: FloatArray
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """P0 = s R̂ and the axis of the last image, carried into base by the nearest measured pose."""
     if len(updates.t_s) == 0 or len(arm.t_s) == 0 or not np.isfinite(radius_m[-1]):
-        return None
+        return None, None
     nearest = int(np.argmin(np.abs(arm.t_s - updates.t_s[-1])))
-    T_base_camera = arm.T_base_camera[nearest]
-    P0 = updates.s[-1] * radius_m[-1]
-    return np.asarray(T_base_camera[:3, :3] @ P0 + T_base_camera[:3, 3])
+    R, p = arm.T_base_camera[nearest, :3, :3], arm.T_base_camera[nearest, :3, 3]
+    P0 = R @ (updates.s[-1] * radius_m[-1]) + p
+    return P0, None if updates.axis is None else R @ updates.axis[-1]

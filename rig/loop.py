@@ -138,7 +138,9 @@ class RunLoop:
         )
 
     def _until_an_end(self) -> Ending:
-        last_s = self._started_s - self._period_s
+        # What piled up while devices were opened is taken before the first tick, not within it.
+        self._fusion.add_states(self._arm.read_states())
+        last_s = self._clock.now_s() - self._period_s
         for now_s in tick_grid(self._clock, self._period_s, self._stats):
             state = self._read(now_s)
             estimate = self._fusion.advance(now_s)

@@ -17,6 +17,7 @@ from rig.analysis import Analysis
 from rig.run_data import RunData, Snapshot
 
 MEASURED, IDEAL = "#1f5fa8", "black"
+_AXIS_SHOWN_M = 0.12  # half the length drawn of a cylinder's axis
 
 
 def write_report(
@@ -33,7 +34,8 @@ def write_report(
     path_axes = figure.add_subplot(grid[1, 1], projection="3d")
     assert isinstance(path_axes, Axes3D)
     draw_path(path_axes, analysis)
-    draw_image(figure.add_subplot(grid[1, 2]), data.newest_snapshot, intrinsics)
+    start_s = data.updates[0].t_s if data.updates else 0.0
+    draw_image(figure.add_subplot(grid[1, 2]), data.newest_snapshot, intrinsics, start_s)
     figure.savefig(path, dpi=90)
     plt.close(figure)
 
@@ -51,6 +53,17 @@ def draw_transient(
     axes.axhline(0.0, color="grey", linewidth=0.5)
     axes.set(title="estimation error z (dashed: ideal)", xlabel="t [s]", ylabel="z [1/m]")
     axes.legend()
+
+
+def draw_deviation(
+    axes: Axes, analysis: Analysis, label: str = "z", colour: str = MEASURED
+) -> None:
+    """How far z is from the ideal response, in per cent of z(0)."""
+    if analysis.z is not None and analysis.z_ideal is not None and len(analysis.z):
+        share = 100 * (analysis.z - analysis.z_ideal) / abs(analysis.z[0])
+        axes.plot(analysis.t_s, share, color=colour, label=label, linewidth=1)
+        axes.legend()
+    axes.set(title="deviation from the ideal response", xlabel="t [s]", ylabel="[% of z(0)]")
 
 
 def draw_radius(axes: Axes, analysis: Analysis) -> None:
@@ -96,14 +109,21 @@ def draw_path(
     some = np.linspace(0, len(p) - 1, 9).astype(int)
     length_m = 0.3 * float(np.ptp(p, axis=0).max()) + 1e-3
     axes.quiver(*p[some].T, *z[some].T, length=length_m, color=colour, linewidth=1)
-    target = analysis.target_m
-    if target is not None:
+    target, axis = analysis.target_m, analysis.target_axis
+    if target is not None and axis is None:
         axes.scatter(*target, color="black", s=20)
+    elif target is not None and axis is not None:
+        ends = target + np.outer([-_AXIS_SHOWN_M, _AXIS_SHOWN_M], axis)
+        axes.plot(*ends.T, color="black", linewidth=1.5)
     axes.set_aspect("equal")
-    axes.set(title="camera path", xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    axes.locator_params(nbins=4)
+    axes.tick_params(labelsize=7)
+    axes.set(title="camera path, base frame", xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
 
 
-def draw_image(axes: Axes, snapshot: Snapshot | None, intrinsics: Intrinsics) -> None:
+def draw_image(
+    axes: Axes, snapshot: Snapshot | None, intrinsics: Intrinsics, start_s: float
+) -> None:
     """The newest image with the fitted outline."""
     axes.set_axis_off()
     if snapshot is None:
@@ -113,6 +133,6 @@ def draw_image(axes: Axes, snapshot: Snapshot | None, intrinsics: Intrinsics) ->
     axes.imshow(snapshot.image, cmap="gray", vmin=0, vmax=255)
     for line in outline_pixels(snapshot.feature, intrinsics, (width, height)):
         axes.plot(line[:, 0], line[:, 1], color="#ff5533", linewidth=1.2)
-    axes.set(title=f"image at t = {snapshot.t_s:.2f} s with the fitted outline")
+    axes.set(title=f"image at t = {snapshot.t_s - start_s:.2f} s with the fitted outline")
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)

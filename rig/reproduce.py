@@ -16,7 +16,7 @@ from rig.records import Json, make_run_dir, write_summary
 from rig.run import RunResult, execute
 
 FIGURES = ("fig3", "fig4", "fig5")
-Panel = Literal["transient", "sigma2", "speed2", "path"]
+Panel = Literal["transient", "deviation", "sigma2", "speed2", "path"]
 
 
 class Curve(BaseModel):
@@ -91,6 +91,7 @@ def draw_figure(path: Path, experiment: Experiment, results: list[RunResult]) ->
 
 _DRAW = {
     "transient": report.draw_transient,
+    "deviation": report.draw_deviation,
     "sigma2": report.draw_sigma2,
     "speed2": report.draw_speed2,
 }

@@ -70,7 +70,7 @@ def run(
     console.print(table(result.summary))
     write_report(
         run_dir / "report.png",
-        f"{target}, {config.name}",
+        _title(target, result),
         result.analysis,
         result.outcome.data,
         result.intrinsics,
@@ -79,6 +79,14 @@ def run(
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
         raise typer.Exit(code)
+
+
+def _title(target: str, result: "RunResult") -> str:
+    """The headline of the report."""
+    radius, true = result.summary["radius_m"], result.summary["radius_true_m"]
+    found = f"R̂ = {radius * 1e3:.3f} mm" if isinstance(radius, float) else "no radius"
+    known = f" (true {true * 1e3:.3f} mm)" if isinstance(true, float) else ""
+    return f"{target}: {found}{known}, {result.outcome.ending.value}"
 
 
 def _explain(result: "RunResult") -> None:
