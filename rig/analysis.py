@@ -48,9 +48,7 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         radius_m = 1.0 / updates.chi
     if radius_true_m is not None and len(t_s) > 1:
         z = 1.0 / radius_true_m - updates.chi
-        z_ideal = ideal_response(
-            motion_t_s, sigma2, config.estimator.alpha, config.estimator.damping, float(z[0]), t_s
-        )
+        z_ideal = _ideal(motion_t_s, sigma2, config, float(z[0]), t_s)
         rms = rms_vs_ideal(t_s, z, z_ideal)
         relative_errors = radius_m / radius_true_m - 1.0
         to_1pct = time_to_within(t_s, relative_errors, 0.01)
@@ -76,6 +74,18 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
     )
 
 
+def _ideal(
+    motion_t_s: FloatArray, sigma2: FloatArray, config: RigConfig, z0: float, at_s: FloatArray
+) -> FloatArray:
+    """The response (5) to the measured motion, starting with z0 at the first image (t = 0)."""
+    inside = (motion_t_s > 0.0) & (motion_t_s < at_s[-1])
+    ends = np.interp([0.0, at_s[-1]], motion_t_s, sigma2)
+    times = np.concatenate(([0.0], motion_t_s[inside], at_s[-1:]))
+    squares = np.concatenate((ends[:1], sigma2[inside], ends[1:]))
+    gains = config.estimator
+    return ideal_response(times, squares, gains.alpha, gains.damping, z0, at_s)
+
+
 def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:
     """σ1² at the arm's stamps: ‖v‖² (sphere), less (aᵀv)² with the measured axis (eq. 21)."""
     v = arm.twist_camera[:, :3]
@@ -84,7 +94,7 @@ def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:
         return speed2
     axis = np.column_stack([np.interp(arm.t_s, updates.t_s, updates.axis[:, i]) for i in range(3)])
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    return np.asarray(speed2 - np.sum(axis * v, axis=1) ** 2)
+    return np.maximum(speed2 - np.sum(axis * v, axis=1) ** 2, 0.0)
 
 
 def _target_base(

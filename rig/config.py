@@ -75,7 +75,7 @@ class MotionConfig(Section):
     velocity_m_s: tuple[Finite, Finite, Finite] = (-0.05, 0.0, 0.0)
     k1: NotNegative = 10.0  # eq. (24): holds the norm of v
     k2: NotNegative = 1.0  # eq. (24): turns v towards the largest sigma1²
-    centring_gain_per_s: Annotated[float, Field(gt=0, le=10)] = 3.0
+    centring_gain_per_s: Annotated[float, Field(gt=0, le=10)] = 5.0
 
 
 class SafetyConfig(Section):

@@ -5,9 +5,10 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.errors import SafetyError
 from drivers.interfaces import ArmState
 from estimator.estimate import Correction, Estimate, Estimator
-from estimator.twist_history import TwistHistory
+from estimator.twist_history import MotionUnknownError, TwistHistory
 from rig.records import RunLog
 from rig.run_data import RunData, Snapshot
 from rig.vision import Sighting
@@ -53,13 +54,17 @@ class Fusion:
     def advance(self, now_s: float) -> Estimate | None:
         """Use every sighting whose motion is known, then predict to ``now_s``.
 
-        Returns None before the first feature.
+        Returns None before the first feature. Raises SafetyError when the arm reports no motion
+        at that time, or one that no arm can make.
         """
-        while self._waiting and self._covered(self._waiting[0].frame.t_exposure_mid_s):
-            self._correct(self._waiting.popleft())
-        if self.last_feature_s is None:
-            return None
-        estimate = self._estimator.predict(now_s, self._motion)
+        try:
+            while self._waiting and self._covered(self._waiting[0].frame.t_exposure_mid_s):
+                self._correct(self._waiting.popleft())
+            if self.last_feature_s is None:
+                return None
+            estimate = self._estimator.predict(now_s, self._motion)
+        except (MotionUnknownError, ArithmeticError) as error:
+            raise SafetyError(f"the measured motion cannot be used: {error}") from error
         self._log.estimate("estimate", estimate)
         return estimate
 

@@ -137,11 +137,15 @@ def read_grey(path: Path) -> GreyImage | None:
     if image is None or image.ndim != 2:
         return None
     if image.dtype == np.uint8:
-        return image.astype(np.uint8, copy=False)
+        return _bytes(image)
     if image.dtype == np.uint16:
-        return np.rint(image / 257.0).astype(np.uint8)
+        return _bytes(np.rint(image / 257.0))
     # Floating-point formats hold 0 to 1.
-    return np.rint(255.0 * np.clip(np.nan_to_num(image.astype(float)), 0.0, 1.0)).astype(np.uint8)
+    return _bytes(np.rint(255.0 * np.clip(np.nan_to_num(image.astype(float)), 0.0, 1.0)))
+
+
+def _bytes(image: NDArray[Any]) -> GreyImage:
+    return image.astype(np.uint8, copy=False)
 
 
 def json_line(result: ImageResult, target: TargetName) -> str:

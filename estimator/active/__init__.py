@@ -1,0 +1,1 @@
+"""The active part: how the camera should move so that the estimate converges well."""

@@ -1,0 +1,65 @@
+"""What an estimator says: the target's state at an instant, and the interface it answers by."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.image.feature import Feature
+from estimator.twist_history import TwistHistory
+
+FloatArray = NDArray[np.float64]
+
+
+class Correction(Enum):
+    """What became of an image handed to an estimator."""
+
+    INITIALISED = "initialised"  # the first image: ŝ = s, χ̂ from the guess
+    APPLIED = "applied"
+    STALE = "stale"  # not later than the last image: ignored, the state is as it was
+    RESTARTED = "restarted"  # the motion since the last image is forgotten: χ̂ kept, ŝ = s
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The target at one instant, in the camera frame of that instant."""
+
+    t_s: float
+    s: FloatArray  # (3,) P0 / R
+    axis: FloatArray | None  # (3,) unit, cylinder only
+    chi: float  # 1/R, in 1/m
+    variance: float | None  # of chi; None when the estimator has no notion of it
+    residual: float  # norm of what the last image contradicted the prediction by, unit of s
+    extrapolated_s: float = 0.0  # how far the arm's motion was extrapolated to get here
+
+    @property
+    def radius_m(self) -> float | None:
+        """R = 1/χ̂, or None while χ̂ is not positive (an underdamped transient crosses zero)."""
+        return 1.0 / self.chi if self.chi > 0.0 else None
+
+
+class Estimator(Protocol):
+    """Moves its state from image to image; anything later is only predicted."""
+
+    def correct(self, feature: Feature, t_s: float, motion: TwistHistory) -> Correction:
+        """Move the state to ``t_s``, the exposure instant of the image ``feature`` came from.
+
+        Raises MotionUnknownError, with the state unchanged, when the arm's motion at ``t_s`` is
+        not known yet.
+        """
+        ...
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The state at the last image's exposure; None before the first image."""
+        ...
+
+    def predict(self, now_s: float, motion: TwistHistory) -> Estimate:
+        """The target at ``now_s``, never earlier than the last image; the state stays as it is.
+
+        Raises ValueError before the first image or for an earlier instant, and
+        MotionUnknownError when the arm's motion is not known up to ``now_s``.
+        """
+        ...
