@@ -49,7 +49,8 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
     if radius_true_m is not None and len(t_s) > 1:
         z = 1.0 / radius_true_m - updates.chi
         z_ideal = _ideal(motion_t_s, sigma2, config, float(z[0]), t_s)
-        rms = rms_vs_ideal(t_s, z, z_ideal)
+        if z[0] != 0.0:  # a perfect guess leaves no transient to compare
+            rms = rms_vs_ideal(t_s, z, z_ideal)
         relative_errors = radius_m / radius_true_m - 1.0
         to_1pct = time_to_within(t_s, relative_errors, 0.01)
         relative = float(relative_errors[-1])

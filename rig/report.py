@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D
 
 from estimator.image.intrinsics import Intrinsics
-from estimator.image.outline import outline_pixels
+from estimator.image.outline import outline_px
 from rig.analysis import Analysis
 from rig.run_data import RunData, Snapshot
 
@@ -131,7 +131,7 @@ def draw_image(
         return
     height, width = snapshot.image.shape
     axes.imshow(snapshot.image, cmap="gray", vmin=0, vmax=255)
-    for line in outline_pixels(snapshot.feature, intrinsics, (width, height)):
+    for line in outline_px(snapshot.feature, intrinsics, snapshot.image.shape):
         axes.plot(line[:, 0], line[:, 1], color="#ff5533", linewidth=1.2)
     axes.set(title=f"image at t = {snapshot.t_s - start_s:.2f} s with the fitted outline")
     axes.set_xlim(-0.5, width - 0.5)

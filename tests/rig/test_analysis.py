@@ -45,6 +45,12 @@ def test_without_a_known_radius_no_error_figure_is_invented(finished) -> None:  
     assert analysis.radius_m[-1] == pytest.approx(RADIUS_M, rel=2e-3)
 
 
+def test_a_perfect_guess_has_no_transient_to_compare(finished) -> None:  # type: ignore[no-untyped-def]
+    bench, _ = finished
+    guess_m = bench.config.estimator.radius_guess_m
+    assert analyse(bench.data, bench.config, guess_m).rms_vs_ideal is None
+
+
 def test_the_summary_holds_every_documented_key(finished, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     bench, outcome = finished
     analysis = analyse(bench.data, bench.config, RADIUS_M)

@@ -1,0 +1,79 @@
+"""Serial gantries for ``rig arm``."""
+
+from collections.abc import Callable
+
+from drivers.clock import Clock
+from drivers.errors import ConfigError, DeviceTimeoutError, OperateError
+from drivers.grbl.arm import GrblArm
+from drivers.grbl.settings import GrblSettings
+from drivers.interfaces import Arm, ArmState
+from rig.arm_kits import Address, Json
+
+_FIRST_STATE_S = 2.0
+_POLL_S = 0.02
+
+
+class GrblKit:
+    """A gantry under grblHAL or Grbl at ``--port``."""
+
+    # Its twists are slopes over a window: the newest lies half of that back.
+    max_state_age_s = 0.3
+
+    def __init__(self, address: Address) -> None:
+        if address.port is None:
+            raise ConfigError("--arm grbl needs --port: the gantry's serial device")
+        given = {"port": address.port, "baud": address.baud}
+        known = {name: value for name, value in given.items() if value is not None}
+        self._settings = GrblSettings.model_validate(known)
+
+    def open(self, clock: Clock) -> Arm:
+        """Open the port and ask the controller about itself."""
+        return GrblArm(self._settings, clock)
+
+    def status(self, clock: Clock) -> dict[str, Json]:
+        """The gantry's state in words, and where it is."""
+        arm = GrblArm(self._settings, clock)
+        try:
+            problem: str | None = None
+            state: ArmState | None = None
+            try:
+                state = _first_state(arm, clock)
+            except OperateError as error:
+                problem = str(error)
+            return {
+                "controller": self._settings.port,
+                "state": arm.explain(),
+                "tool_position_m": None if state is None else state.T_base_tool[:3, 3].tolist(),
+                "problem": problem,
+            }
+        finally:
+            arm.close()
+
+    def stop(self, clock: Clock) -> str:
+        """Cancel any jog."""
+        arm = GrblArm(self._settings, clock)
+        try:
+            arm.stop()
+        finally:
+            arm.close()
+        return f"the gantry at {self._settings.port} was told to cancel its motion"
+
+    def recover(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
+        """Reset and unlock after asking."""
+        arm = GrblArm(self._settings, clock)
+        try:
+            arm.recover(confirm)
+            _first_state(arm, clock)
+        finally:
+            arm.close()
+        return f"the gantry at {self._settings.port} takes commands again; it did not move"
+
+
+def _first_state(arm: Arm, clock: Clock) -> ArmState:
+    deadline_s = clock.now_s() + _FIRST_STATE_S
+    while clock.now_s() < deadline_s:
+        states = arm.read_states()
+        if states:
+            return states[-1]
+        clock.sleep_until(clock.now_s() + _POLL_S)
+    raise DeviceTimeoutError("the gantry reports no position: check that it is powered")

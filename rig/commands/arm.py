@@ -1,0 +1,180 @@
+"""``rig arm``: look at an arm, jog it, stop it, bring it back; no rig file needed."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from rig.commands.options import AsJson, RigFile
+from rig.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rig.arm_kits import ArmKit
+    from rig.config import SafetyConfig
+    from rig.jog import JogResult
+
+arm_app = typer.Typer(help="Look at an arm, jog it, stop it, bring it back.", no_args_is_help=True)
+
+ArmName = Annotated[
+    Literal["ur", "grbl", "sim"], typer.Option("--arm", help="The kind of arm.", show_default=False)
+]
+Host = Annotated[str | None, typer.Option(help="UR: the controller's address.")]
+Port = Annotated[str | None, typer.Option(help="Gantry: the serial device.")]
+Baud = Annotated[int | None, typer.Option(help="Gantry: the serial speed.")]
+
+
+@arm_app.command()
+def status(
+    arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None, as_json: AsJson = False
+) -> None:
+    """Say how the arm is; nothing moves. Exit status 3 when something keeps it from moving."""
+    from drivers.clock import WallClock
+
+    facts = _kit(arm, host, port, baud).status(WallClock())
+    if as_json:
+        print(json.dumps(facts), flush=True)
+    else:
+        Console().print(_table("arm", facts))
+    if facts["problem"] is not None:
+        raise typer.Exit(ExitCode.DEVICE)
+
+
+@arm_app.command()
+def jog(
+    arm: ArmName,
+    twist: Annotated[
+        str, typer.Option(help="vx,vy,vz,wx,wy,wz in m/s and rad/s.", show_default=False)
+    ],
+    for_s: Annotated[
+        float, typer.Option("--for", min=0.05, max=60.0, help="Seconds.", show_default=False)
+    ],
+    frame: Annotated[
+        Literal["base", "tool"], typer.Option(help="Axes of the twist; it is the tool's.")
+    ] = "base",
+    host: Host = None,
+    port: Port = None,
+    baud: Baud = None,
+    rig: RigFile = None,
+    as_json: AsJson = False,
+) -> None:
+    """Move the arm within the limits and report what it did; Ctrl-C stops it.
+
+    The limits are those of the rig file's `safety` section, the defaults without one.
+    """
+    from drivers.clock import WallClock
+    from rig.jog import jog as run_jog
+    from rig.stop_request import StopRequest
+
+    wanted = _numbers(twist)
+    kit = _kit(arm, host, port, baud)
+    safety = _limits(rig, kit.max_state_age_s)
+    clock = WallClock()
+    with StopRequest() as stop_requested:
+        device = kit.open(clock)
+        try:
+            result = run_jog(device, clock, wanted, frame == "base", for_s, safety, stop_requested)
+        finally:
+            device.close()
+    facts = _jog_facts(result, frame)
+    if as_json:
+        print(json.dumps(facts), flush=True)
+    else:
+        Console().print(_table("jog", facts))
+    if result.interrupted:
+        raise typer.Exit(ExitCode.INTERRUPTED)
+
+
+@arm_app.command()
+def stop(arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None) -> None:
+    """Stop whatever the arm does now, whoever started it. Not an emergency stop."""
+    from drivers.clock import WallClock
+
+    print(_kit(arm, host, port, baud).stop(WallClock()))
+
+
+@arm_app.command()
+def recover(
+    arm: ArmName,
+    host: Host = None,
+    port: Port = None,
+    baud: Baud = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+) -> None:
+    """Explain why the arm stopped, ask, unlock it; no old motion resumes."""
+    from drivers.clock import WallClock
+
+    def confirm(explanation: str) -> bool:
+        print(explanation)
+        return yes or typer.confirm("Is everybody clear of the arm, and shall it be unlocked?")
+
+    print(_kit(arm, host, port, baud).recover(WallClock(), confirm))
+
+
+def _kit(arm: str, host: str | None, port: str | None, baud: int | None) -> "ArmKit":
+    from rig.arm_kits import Address, arm_kit
+
+    return arm_kit(arm, Address(host, port, baud))
+
+
+def _limits(rig: Path | None, max_state_age_s: float) -> "SafetyConfig":
+    """The envelope, with room for the age that this arm's states normally have."""
+    from rig.config import SafetyConfig
+    from rig.config_load import load_config
+
+    safety = SafetyConfig() if rig is None else load_config("sphere", rig).safety
+    oldest_s = max(safety.max_state_age_s, max_state_age_s)
+    return safety.model_copy(update={"max_state_age_s": oldest_s})
+
+
+def _numbers(text: str) -> Any:
+    import numpy as np
+
+    from drivers.errors import ConfigError
+
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError as error:
+        raise ConfigError(f"--twist {text!r}: {error}") from error
+    if values.shape != (6,):
+        raise ConfigError(f"--twist {text!r}: write it as vx,vy,vz,wx,wy,wz")
+    return values
+
+
+def _jog_facts(result: "JogResult", frame: str) -> dict[str, Any]:
+    import numpy as np
+
+    error = result.measured - result.commanded
+    return {
+        "frame": frame,
+        "commanded": result.commanded.tolist(),
+        "allowed": result.allowed.tolist(),
+        "measured": result.measured.tolist(),
+        "linear_error_m_s": float(np.linalg.norm(error[:3])),
+        "angular_error_rad_s": float(np.linalg.norm(error[3:])),
+        "limited_by": list(result.limited_by),
+        "latency_s": result.latency_s,
+        "stop_s": result.stop_s,
+        "moved_m": result.moved_m,
+        "states": result.states,
+        "state_rate_hz": result.state_rate_hz,
+        "overruns": result.overruns,
+        "interrupted": result.interrupted,
+    }
+
+
+def _table(title: str, facts: dict[str, Any]) -> Table:
+    table = Table(title=title, show_header=False)
+    for name, value in facts.items():
+        table.add_row(name.replace("_", " "), _words(value))
+    return table
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_words(part) for part in value) + "]" if value else "–"
+    return "–" if value is None else str(value)
