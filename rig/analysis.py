@@ -95,7 +95,8 @@ def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:
         return speed2
     axis = np.column_stack([np.interp(arm.t_s, updates.t_s, updates.axis[:, i]) for i in range(3)])
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-    return np.maximum(speed2 - np.sum(axis * v, axis=1) ** 2, 0.0)
+    sigma2: FloatArray = np.maximum(speed2 - np.sum(axis * v, axis=1) ** 2, 0.0)
+    return sigma2
 
 
 def _target_base(

@@ -1,6 +1,7 @@
 """What ``rig camera`` says about cameras, as text and as JSON."""
 
 from drivers.camera.check import CameraCheck
+from drivers.camera.v4l2_ioctl import OfferedMode
 from drivers.camera.v4l2_nodes import VideoNode
 from rig.records import Json
 
@@ -15,14 +16,17 @@ def modes_text(node: VideoNode, whole: bool) -> str:
             + ", ".join(f"{rate:g}" for rate in mode.rates_hz)
             for mode in node.modes
         )
-    lines = []
+    formats: dict[str, list[str]] = {}  # by what they offer: raw drivers list dozens alike
     for fourcc in dict.fromkeys(mode.fourcc for mode in node.modes):
-        modes = [mode for mode in node.modes if mode.fourcc == fourcc]
-        largest = max(modes, key=lambda mode: mode.width * mode.height)
-        fastest = max((rate for mode in modes for rate in mode.rates_hz), default=None)
-        rate = "" if fastest is None else f", up to {fastest:g} fps"
-        lines.append(f"{fourcc} up to {largest.width}x{largest.height}{rate}")
-    return "\n".join(lines) or "–"
+        formats.setdefault(_offer([m for m in node.modes if m.fourcc == fourcc]), []).append(fourcc)
+    return "\n".join(f"{' '.join(names)} {offer}" for offer, names in formats.items()) or "–"
+
+
+def _offer(modes: list[OfferedMode]) -> str:
+    largest = max(modes, key=lambda mode: mode.width * mode.height)
+    fastest = max((rate for mode in modes for rate in mode.rates_hz), default=None)
+    rate = "" if fastest is None else f", up to {fastest:g} fps"
+    return f"up to {largest.width}x{largest.height}{rate}"
 
 
 def report(result: CameraCheck) -> dict[str, Json]:

@@ -13,6 +13,7 @@ from drivers.camera.v4l2_ioctl import OfferedMode
 from drivers.camera.v4l2_nodes import Holder, VideoNode
 from drivers.errors import ConfigError, ConnectError, RigError
 from rig.commands.camera import camera_app
+from rig.commands.camera_preview import half_blocks
 from rig.exit_codes import ExitCode
 from sim_backend.loopback_camera.server import MjpegServer
 from tests.drivers.camera import recordings
@@ -98,9 +99,21 @@ def test_show_describes_and_saves_one_picture(tmp_path: Path) -> None:
     result = call("show", "--source", str(source), "--save", str(saved))
     assert result.exit_code == 0, result.output
     assert "64x48" in result.stdout
-    assert np.array_equal(cv2.imread(str(saved), cv2.IMREAD_GRAYSCALE), recordings.picture(0))
+    written = np.asarray(cv2.imread(str(saved), cv2.IMREAD_GRAYSCALE))
+    assert np.array_equal(written, recordings.picture(0))
     unknown = str(tmp_path / "picture.nonsense")
     assert "cannot write" in fails(ConfigError, "show", "--source", str(source), "--save", unknown)
+
+
+def test_the_terminal_preview_keeps_shape_and_brightness() -> None:
+    image = np.zeros((480, 640), np.uint8)
+    image[:, 320:] = 200
+    text = half_blocks(image, columns=40, rows=50)
+    lines = text.plain.splitlines()
+    assert [len(line) for line in lines] == [40] * 15  # two pixels high, as wide as told
+    styles = [str(span.style) for span in text.spans]
+    assert styles[0] == "rgb(0,0,0) on rgb(0,0,0)"
+    assert styles[39] == "rgb(200,200,200) on rgb(200,200,200)"
 
 
 def test_check_of_a_recording_prints_one_json_object(tmp_path: Path) -> None:

@@ -43,9 +43,7 @@ def test_an_existing_empty_directory_is_used(tmp_path: Path) -> None:
     assert make_run_dir(tmp_path, "sphere") == tmp_path
 
 
-def test_default_directories_never_collide(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_default_directories_never_collide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert len({make_run_dir(None, "sphere") for _ in range(3)}) == 3
     assert len({make_figures_dir(None, "fig3") for _ in range(3)}) == 3

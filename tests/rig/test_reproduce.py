@@ -1,4 +1,4 @@
-"""The paper's experiments on rendered pixels: every curve follows (5), and fig. 5 shows its point."""
+"""The paper's experiments on rendered pixels: every curve follows (5); fig. 5 shows its point."""
 
 import json
 import sys

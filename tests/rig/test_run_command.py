@@ -206,8 +206,11 @@ def test_wrong_usage_exits_2_says_why_and_leaves_nothing_behind(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_in_real_time_ramps_the_arm_to_rest(number: int, tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", "from rig.cli import main; main()", "run", "--target", "sphere"]
-        + ["--realtime", "--duration", "60", "--json", "--out", str(tmp_path), *RASTER],
+        [
+            *(sys.executable, "-c", "from rig.cli import main; main()", "run"),
+            *("--target", "sphere", "--realtime", "--duration", "60", "--json"),
+            *("--out", str(tmp_path), *RASTER),
+        ],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

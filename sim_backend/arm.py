@@ -1,0 +1,98 @@
+"""The simulated gantry behind the ``Arm`` interface."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.errors import OperateError
+from drivers.interfaces import ArmState
+from sim_backend.config import ArmConfig
+from sim_backend.jit import jit
+from sim_backend.kinematics import tool_pose, tool_twist
+from sim_backend.world import World
+
+FloatArray = NDArray[np.float64]
+
+_STEPS_PER_SAMPLE = 2  # of 1 ms: the controller reports at 500 Hz
+
+
+class SimulatedArm:
+    """The gantry as its controller shows it: late, quantised and a little noisy."""
+
+    def __init__(self, config: ArmConfig, world: World, seed: int) -> None:
+        self._world = world
+        self._delay_s = config.report_delay_s
+        self._steps = np.repeat([config.encoder_step_m, config.encoder_step_rad], 3).astype(float)
+        self._noise = np.repeat([config.noise_m_s, config.noise_rad_s], 3).astype(float)
+        self._random = np.random.default_rng([seed, 1])
+        self._next = 0  # number of the first sample not returned yet
+        self._closed = False
+        # Compiles the kernels now rather than in the middle of a run.
+        _measure(np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 6)), self._steps)
+
+    def read_states(self) -> list[ArmState]:
+        """Every sample reported since the last call, oldest first.
+
+        After more than two minutes without a call the oldest samples are lost.
+        """
+        history = self._world.history
+        newest_s = self._world.sync() - self._delay_s
+        ripe = (newest_s - history.start_s) / (history.step_s * _STEPS_PER_SAMPLE)
+        last = int(np.floor(ripe + 1e-6))
+        if last < self._next:
+            return []
+        # The noise is drawn for lost samples as well: the stream stays tied to their numbers.
+        noise = self._random.standard_normal((last + 1 - self._next, 6)) * self._noise
+        numbers = np.arange(self._next, last + 1) * _STEPS_PER_SAMPLE
+        self._next = last + 1
+        kept = numbers >= history.first
+        numbers, noise = numbers[kept], noise[kept]
+        q, qd = history.entries(numbers)
+        poses, twists = _measure(q, qd, noise, self._steps)
+        times = history.start_s + numbers * history.step_s
+        return [
+            ArmState(t_s=float(t), T_base_tool=T, twist_tool=twist)
+            for t, T, twist in zip(times, poses, twists, strict=True)
+        ]
+
+    def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
+        """Follow ``twist_tool`` (6,), held in the tool's own axes, for ``hold_s`` from now.
+
+        Raises OperateError, after a stop, for a command that is not six finite numbers and a
+        finite hold time, or after ``close``.
+        """
+        twist = np.asarray(twist_tool, dtype=float)
+        if self._closed:
+            raise OperateError("simulated arm: command after close; build the rig again")
+        if twist.shape != (6,) or not np.all(np.isfinite(twist)) or not 0.0 <= hold_s < np.inf:
+            self.stop()
+            raise OperateError(
+                f"simulated arm: refused the twist {twist.tolist()} for {hold_s!r} s and stopped; "
+                "a command is six finite numbers and a finite hold time"
+            )
+        self._world.command(twist, hold_s)
+
+    def stop(self) -> None:
+        """Ramp to standstill at the acceleration limits."""
+        self._world.command(np.zeros(6), 0.0)
+
+    def close(self) -> None:
+        """Stop; later commands are refused."""
+        self.stop()
+        self._closed = True
+
+
+@jit
+def _measure(
+    q: FloatArray, qd: FloatArray, noise: FloatArray, steps: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Poses (m, 4, 4) by quantised encoders and twists (m, 6) by noisy joint velocities."""
+    m = q.shape[0]
+    poses, twists = np.empty((m, 4, 4)), np.empty((m, 6))
+    for k in range(m):
+        seen = q[k].copy()
+        for i in range(6):
+            if steps[i] > 0.0:
+                seen[i] = np.floor(seen[i] / steps[i] + 0.5) * steps[i]
+        poses[k] = tool_pose(seen)
+        twists[k] = tool_twist(seen, qd[k] + noise[k])
+    return poses, twists

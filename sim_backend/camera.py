@@ -1,0 +1,124 @@
+"""The simulated camera behind the ``Camera`` interface: frames that arrive late or never."""
+
+import math
+
+import numpy as np
+
+from drivers.errors import OperateError
+from drivers.interfaces import Frame
+from sim_backend.config import CameraConfig
+from sim_backend.exposure import Exposure
+from sim_backend.lens import Lens, vignetting_gain
+from sim_backend.renderer import Renderer
+from sim_backend.sensor import expose
+from sim_backend.world import World
+
+# Frames looked at in one go when searching for the newest; jitter never reorders further.
+_JITTER_LIMIT_SIGMAS = 3.0
+
+
+class SimulatedCamera:
+    """A free-running camera: frame n is exposed on a fixed grid and readable some time later.
+
+    A frame becomes readable ``latency_s`` plus jitter after its mid-exposure, but not before
+    it is exposed and read out. Frames are rendered when they are read, by the reading thread,
+    so that frames nobody reads cost nothing. With a rolling shutter a frame's instant is that
+    of the middle row.
+    """
+
+    def __init__(
+        self,
+        config: CameraConfig,
+        lens: Lens,
+        world: World,
+        exposure: Exposure,
+        renderer: Renderer,
+        seed: int,
+    ) -> None:
+        self._config = config
+        self._world = world
+        self._exposure = exposure
+        self._renderer = renderer
+        self._gain = vignetting_gain(config, lens)
+        self._seed = seed
+        # Compiles the kernel now rather than in the middle of a run.
+        expose(np.zeros((1, 4), np.float32), self._gain[:1, :4], 0.0, 0)
+        self._period_s = 1.0 / config.rate_hz
+        # From the first light on any row, or to the last, to the frame's instant.
+        self._half_s = (config.exposure_s + config.row_time_s * (config.height - 1)) / 2
+        self._first_s = world.clock.now_s() + self._half_s
+        self._last_seq = -1
+        self._closed = False
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """The newest readable frame not returned before; see ``drivers.interfaces.Camera``."""
+        if self._closed:
+            raise OperateError("simulated camera: read after close; build the rig again")
+        clock = self._world.clock
+        deadline_s = clock.now_s() + timeout_s
+        while True:
+            now_s = self._world.sync()
+            seq = self._newest_readable(now_s)
+            if seq is not None:
+                self._last_seq = seq
+                return self._take(seq)
+            next_s = self._next_readable_s()
+            if now_s >= deadline_s or next_s > deadline_s:
+                clock.sleep_until(deadline_s)
+                # A clock may wake late: look once more unless it is still too early.
+                if clock.now_s() < next_s:
+                    return None
+            else:
+                clock.sleep_until(next_s)
+
+    def close(self) -> None:
+        """Release the renderer."""
+        self._closed = True
+        self._renderer.close()
+
+    def _take(self, seq: int) -> Frame:
+        mid_s = self._mid_s(seq)
+        radiance = self._exposure.render(self._renderer, mid_s)
+        key = int(np.random.default_rng([self._seed, 2, seq]).integers(1 << 63))
+        return Frame(
+            image=expose(radiance, self._gain, self._config.noise_grey, key),
+            t_exposure_mid_s=mid_s,
+            exposure_s=self._config.exposure_s,
+            seq=seq,
+            stamp_source="sim",
+        )
+
+    def _mid_s(self, seq: int) -> float:
+        return self._first_s + seq * self._period_s
+
+    def _readable_s(self, seq: int) -> float:
+        """When frame ``seq`` can be read; never (infinity) if it is dropped."""
+        c = self._config
+        if c.latency_jitter_s == 0.0 and c.drop_probability == 0.0:
+            return self._mid_s(seq) + max(c.latency_s, self._half_s)
+        random = np.random.default_rng([self._seed, 3, seq])
+        if random.random() < c.drop_probability:
+            return math.inf
+        limit = _JITTER_LIMIT_SIGMAS
+        jitter_s = c.latency_jitter_s * min(max(random.standard_normal(), -limit), limit)
+        return self._mid_s(seq) + max(c.latency_s + jitter_s, self._half_s)
+
+    def _newest_readable(self, now_s: float) -> int | None:
+        """The highest frame number above the last one returned that is readable now."""
+        newest = math.floor((now_s - self._half_s - self._first_s) / self._period_s + 1e-9)
+        for seq in range(newest, self._last_seq, -1):
+            if self._readable_s(seq) <= now_s + 1e-9:
+                return seq
+        return None
+
+    def _next_readable_s(self) -> float:
+        """When the next frame above the last one returned becomes readable."""
+        c = self._config
+        soonest_s = math.inf
+        seq = self._last_seq + 1
+        least_s = max(c.latency_s - _JITTER_LIMIT_SIGMAS * c.latency_jitter_s, self._half_s)
+        # Later frames can overtake only while even their shortest delay could be sooner.
+        while self._mid_s(seq) + least_s < soonest_s:
+            soonest_s = min(soonest_s, self._readable_s(seq))
+            seq += 1
+        return soonest_s

@@ -1,0 +1,85 @@
+"""The renderer that needs no OpenGL: exact outlines computed on the processor."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_backend.lens import Lens
+from sim_backend.raster_floor import padded
+from sim_backend.raster_kernel import render_rows
+from sim_backend.raster_solids import CYLINDER, PACKED, SPHERE
+from sim_backend.scene import Cylinder, Scene, Sphere
+
+FloatArray = NDArray[np.float64]
+
+# The floor is smooth compared with outlines: it may move this far between its samples.
+_FLOOR_STEP_PX = 1.0
+
+
+class RasterRenderer:
+    """Renders spheres, cylinders and the floor with area coverage; no state but the scene."""
+
+    name = "raster"
+
+    def __init__(self, scene: Scene, lens: Lens) -> None:
+        self._lens = lens
+        self._rays = lens.ray_table()
+        self._scene = scene
+        self._solids = np.array([_pack(solid) for solid in scene.solids])
+        self._greys = padded(scene.floor.greys)
+        self._floor_mean = np.float32(scene.floor.mean_grey)
+        # Compiles the kernels now rather than in the middle of a run.
+        self.render(np.eye(4)[None], (0, 1))
+
+    def render(self, T_base_camera: FloatArray, rows: tuple[int, int]) -> NDArray[np.float32]:
+        """See ``Renderer.render``."""
+        image = np.empty((rows[1] - rows[0], self._lens.width), np.float32)
+        poses = np.ascontiguousarray(T_base_camera)
+        render_rows(
+            image,
+            rows[0],
+            self._rays,
+            self._lens.focal_px,
+            poses,
+            self._solids,
+            self._scene.light,
+            self._scene.ambient,
+            self._greys,
+            self._scene.floor.texel_m,
+            self._floor_mean,
+            self._floor_poses(poses),
+        )
+        return image
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    def _floor_poses(self, poses: FloatArray) -> NDArray[np.int64]:
+        """Which of the poses suffice for the floor, evenly spread."""
+        k = len(poses)
+        if k == 1:
+            return np.zeros(1, np.int64)
+        n = min(k, max(1, math.ceil(floor_motion_px(poses, self._lens) / _FLOOR_STEP_PX)))
+        return ((np.arange(n) + 0.5) * k / n).astype(np.int64)
+
+
+def floor_motion_px(poses: FloatArray, lens: Lens) -> float:
+    """How far the floor in the middle of the image moves from the first to the last pose."""
+    first, last = poses[0], poses[-1]
+    if first[2, 2] > -0.05 or first[2, 3] <= 0.0:
+        return 0.0  # looking at the horizon
+    point = first[:3, 3] - first[2, 3] / first[2, 2] * first[:3, 2]
+    seen = last[:3, :3].T @ (point - last[:3, 3])
+    return float(lens.focal_px * np.hypot(seen[0], seen[1]) / seen[2])
+
+
+def _pack(solid: Sphere | Cylinder) -> FloatArray:
+    row = np.zeros(PACKED)
+    row[7], row[9] = solid.radius_m, solid.albedo_grey
+    if isinstance(solid, Sphere):
+        row[0], row[1:4] = SPHERE, solid.centre_m
+    else:
+        row[0], row[1:4], row[4:7] = CYLINDER, solid.middle_m, solid.axis
+        row[8] = solid.half_length_m
+    return row

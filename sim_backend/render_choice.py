@@ -1,0 +1,37 @@
+"""Which renderer a configuration gets."""
+
+from typing import Literal
+
+from drivers.errors import ConnectError
+from sim_backend.gl import GlRenderer
+from sim_backend.gl_context import why_no_gl
+from sim_backend.lens import Lens
+from sim_backend.raster import RasterRenderer
+from sim_backend.renderer import Renderer
+from sim_backend.scene import Scene
+
+RendererName = Literal["raster", "gl"]
+
+
+def choose_renderer(wanted: Literal["auto", "gl", "raster"]) -> RendererName:
+    """The renderer to use: with ``auto`` gl where an OpenGL context can be made, else raster.
+
+    Raises ConnectError where ``gl`` is wanted and there is no OpenGL.
+    """
+    if wanted == "raster":
+        return "raster"
+    reason = why_no_gl()
+    if not reason:
+        return "gl"
+    if wanted == "auto":
+        return "raster"
+    raise ConnectError(
+        "sim.renderer = gl: no OpenGL context can be made here; install OpenGL's EGL library (on "
+        "Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri) or choose sim.renderer = raster "
+        f"({reason})"
+    )
+
+
+def make_renderer(name: RendererName, scene: Scene, lens: Lens) -> Renderer:
+    """The named renderer, ready to draw ``scene`` through ``lens``."""
+    return GlRenderer(scene, lens) if name == "gl" else RasterRenderer(scene, lens)
