@@ -1,38 +1,22 @@
-"""``rig measure``: the feature s of a sphere or cylinder in image files."""
+"""The features of a sphere or cylinder in image files: read, measured, described."""
 
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import cv2
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from drivers.clock import thread_cpu_time_s
 from drivers.errors import ConfigError
 from estimator.image.feature import Measurement
-from estimator.image.tracker import TargetTracker, warm_up
+from estimator.image.tracker import Method, Target, TargetTracker, warm_up
 from rig.intrinsics_option import read_intrinsics
 
 GreyImage = NDArray[np.uint8]
-
-
-class TargetName(StrEnum):
-    """What to look for."""
-
-    sphere = "sphere"
-    cylinder = "cylinder"
-
-
-class MethodName(StrEnum):
-    """How to measure it."""
-
-    limb = "limb"
-    moments = "moments"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,57 +29,11 @@ class ImageResult:
     decoded: bool = True
 
 
-def measure(
-    images: Annotated[
-        list[Path], typer.Argument(help="Image files, measured in this order.", show_default=False)
-    ],
-    target: Annotated[TargetName, typer.Option(help="What to look for.")],
-    intrinsics: Annotated[
-        str,
-        typer.Option(
-            metavar="FILE|fx,fy,cx,cy[,k1,k2,p1,p2,k3]",
-            help="The camera: numbers in px (pixel centres at integers), or a YAML file with "
-            "fx, fy, cx, cy and, if any, distortion: [k1, k2, p1, p2, k3], at the top level or "
-            "under intrinsics.",
-        ),
-    ],
-    method: Annotated[
-        MethodName,
-        typer.Option(help="limb: the outline's pixels; moments: threshold and area, sphere only."),
-    ] = MethodName.limb,
-    sequence: Annotated[
-        bool, typer.Option("--sequence", help="Track from image to image.")
-    ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON object per image and line.")
-    ] = False,
-) -> None:
-    """Measure s = P0 / R of a sphere or cylinder in images.
-
-    With --json each line holds: image, found, reason (null when found), s, axis (cylinder only),
-    s_std (standard deviations of s; s, axis and s_std are null when not found) and cpu_ms (of this
-    image's measurement on one thread, without reading the file). Colour is converted to grey,
-    16-bit images are scaled to 8.
-
-    Exit codes: 0 all images were read, whether or not the target is in them; 2 a wrong option, or a
-    file that is missing or no image (nothing is measured then). An image that turns out to be
-    damaged is reported as not found, the others are still measured, and the exit code is 2.
-    """
-    try:
-        results = measure_files(images, target, intrinsics, method, sequence)
-        damaged = [_printed(result, target, as_json) for result in results]
-    except ConfigError as error:
-        typer.echo(f"Error: {error}", err=True)
-        raise typer.Exit(2) from error
-    if any(damaged):
-        raise typer.Exit(2)
-
-
 def measure_files(
     images: list[Path],
-    target: TargetName,
+    target: Target,
     intrinsics: str,
-    method: MethodName = MethodName.limb,
+    method: Method = "limb",
     sequence: bool = False,
 ) -> Iterator[ImageResult]:
     """Results image by image, as they are measured.
@@ -104,11 +42,11 @@ def measure_files(
     are no images.
     """
     camera = read_intrinsics(intrinsics)
-    if target == TargetName.cylinder and method == MethodName.moments:
+    if target == "cylinder" and method == "moments":
         raise ConfigError("--method moments measures spheres only: use limb for a cylinder")
     for path in images:
         _check_file(path)
-    return _measured(images, TargetTracker(target.value, camera, method.value), sequence)
+    return _measured(images, TargetTracker(target, camera, method), sequence)
 
 
 def _measured(images: list[Path], tracker: TargetTracker, sequence: bool) -> Iterator[ImageResult]:
@@ -148,7 +86,7 @@ def _bytes(image: NDArray[Any]) -> GreyImage:
     return image.astype(np.uint8, copy=False)
 
 
-def json_line(result: ImageResult, target: TargetName) -> str:
+def json_line(result: ImageResult, target: Target) -> str:
     """One image's result as one line of strict JSON."""
     feature = result.measurement.feature
     record: dict[str, Any] = {
@@ -157,7 +95,7 @@ def json_line(result: ImageResult, target: TargetName) -> str:
         "reason": None if feature is not None else result.measurement.reason,
         "s": None if feature is None else feature.s.tolist(),
     }
-    if target == TargetName.cylinder:
+    if target == "cylinder":
         axis = None if feature is None else feature.axis
         record["axis"] = None if axis is None else axis.tolist()
     record["s_std"] = None if feature is None else np.sqrt(np.diag(feature.covariance)).tolist()
@@ -176,14 +114,6 @@ def text_line(result: ImageResult) -> str:
     if feature.axis is not None:
         axis = "  axis = (" + ", ".join(f"{v:.5f}" for v in feature.axis) + ")"
     return f"{result.image}: s = ({values}){axis}  [{result.cpu_ms:.1f} ms]"
-
-
-def _printed(result: ImageResult, target: TargetName, as_json: bool) -> bool:
-    """Print a result; True when its file was damaged."""
-    typer.echo(json_line(result, target) if as_json else text_line(result))
-    if not result.decoded:
-        typer.echo(f"Error: {result.measurement.reason}", err=True)
-    return not result.decoded
 
 
 def _check_file(path: Path) -> None:

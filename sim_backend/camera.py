@@ -1,6 +1,7 @@
 """The simulated camera behind the ``Camera`` interface: frames that arrive late or never."""
 
 import math
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -21,9 +22,10 @@ class SimulatedCamera:
     """A free-running camera: frame n is exposed on a fixed grid and readable some time later.
 
     A frame becomes readable ``latency_s`` plus jitter after its mid-exposure, but not before
-    it is exposed and read out. Frames are rendered when they are read, by the reading thread,
-    so that frames nobody reads cost nothing. With a rolling shutter a frame's instant is that
-    of the middle row.
+    it is exposed and read out. With a rolling shutter a frame's instant is that of the middle
+    row. Rendering happens in a thread of its own: a call of ``read`` that finds a frame exposed
+    but not readable yet has it rendered meanwhile, at most one ahead. What is returned, and
+    when, does not depend on that.
     """
 
     def __init__(
@@ -49,6 +51,8 @@ class SimulatedCamera:
         self._first_s = world.clock.now_s() + self._half_s
         self._last_seq = -1
         self._closed = False
+        self._darkroom = ThreadPoolExecutor(1, thread_name_prefix="sim-camera")
+        self._ahead: tuple[int, Future[Frame]] | None = None
 
     def read(self, timeout_s: float) -> Frame | None:
         """The newest readable frame not returned before; see ``drivers.interfaces.Camera``."""
@@ -61,7 +65,8 @@ class SimulatedCamera:
             seq = self._newest_readable(now_s)
             if seq is not None:
                 self._last_seq = seq
-                return self._take(seq)
+                return self._taken(seq)
+            self._take_ahead(now_s)
             next_s = self._next_readable_s()
             if now_s >= deadline_s or next_s > deadline_s:
                 clock.sleep_until(deadline_s)
@@ -72,9 +77,23 @@ class SimulatedCamera:
                 clock.sleep_until(next_s)
 
     def close(self) -> None:
-        """Release the renderer."""
+        """Release the renderer; harmless when repeated."""
         self._closed = True
+        self._darkroom.shutdown()
         self._renderer.close()
+
+    def _take_ahead(self, now_s: float) -> None:
+        """Begin with the newest frame that is exposed, unless another is being worked on."""
+        seq = self._newest_exposed(now_s)
+        if self._ahead is not None and (self._ahead[0] >= seq or not self._ahead[1].done()):
+            return
+        if seq > self._last_seq and self._readable_s(seq) < math.inf:
+            self._ahead = seq, self._darkroom.submit(self._take, seq)
+
+    def _taken(self, seq: int) -> Frame:
+        if self._ahead is not None and self._ahead[0] == seq:
+            return self._ahead[1].result()
+        return self._darkroom.submit(self._take, seq).result()
 
     def _take(self, seq: int) -> Frame:
         mid_s = self._mid_s(seq)
@@ -103,10 +122,13 @@ class SimulatedCamera:
         jitter_s = c.latency_jitter_s * min(max(random.standard_normal(), -limit), limit)
         return self._mid_s(seq) + max(c.latency_s + jitter_s, self._half_s)
 
+    def _newest_exposed(self, now_s: float) -> int:
+        """The highest frame number whose last light has fallen by now."""
+        return math.floor((now_s - self._half_s - self._first_s) / self._period_s + 1e-9)
+
     def _newest_readable(self, now_s: float) -> int | None:
         """The highest frame number above the last one returned that is readable now."""
-        newest = math.floor((now_s - self._half_s - self._first_s) / self._period_s + 1e-9)
-        for seq in range(newest, self._last_seq, -1):
+        for seq in range(self._newest_exposed(now_s), self._last_seq, -1):
             if self._readable_s(seq) <= now_s + 1e-9:
                 return seq
         return None

@@ -6,21 +6,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
 from drivers.errors import ConfigError
 from rig.intrinsics_option import read_intrinsics
-from rig.measure import measure
 from tests.estimator.image.exact_images import Look, cylinder_s, render
+from tests.rig.command_line import rig
 
 CAMERA = "800,800,319.5,239.5"
 SPHERE = np.array([0.4, -0.3, 12.8])
 AXIS = np.array([0.3, 0.95, 0.0]) / np.linalg.norm([0.3, 0.95, 0.0])
 CYLINDER = cylinder_s(np.array([0.2, 0.0, 9.0]), AXIS)
-
-app = typer.Typer()
-app.command()(measure)
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +37,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def lines(folder: Path, names: list[str], *options: str) -> list[dict[str, object]]:
     paths = [str(folder / name) for name in names]
-    result = CliRunner().invoke(app, [*paths, "--intrinsics", CAMERA, "--json", *options])
-    assert result.exit_code == 0, result.output
+    result = rig("measure", *paths, "--intrinsics", CAMERA, "--json", *options)
+    assert result.exit_code == 0, result.stderr
     return [json.loads(line) for line in result.stdout.splitlines()]
 
 
@@ -79,11 +74,15 @@ def test_cylinders_come_with_their_axis(folder: Path) -> None:
 
 
 def test_without_json_each_image_is_a_readable_line(folder: Path) -> None:
-    result = CliRunner().invoke(
-        app,
-        [str(folder / "sphere.png"), str(folder / "empty.png"), "--target", "sphere",
-         "--intrinsics", CAMERA],
-    )  # fmt: skip
+    result = rig(
+        "measure",
+        str(folder / "sphere.png"),
+        str(folder / "empty.png"),
+        "--target",
+        "sphere",
+        "--intrinsics",
+        CAMERA,
+    )
     one, other = result.stdout.splitlines()
     assert "s = (" in one and "±" in one
     assert "not found: " in other and result.exit_code == 0
@@ -101,27 +100,35 @@ def test_wrong_files_are_named_before_anything_is_printed(
     folder: Path, arguments: list[str], named: str
 ) -> None:
     paths = [str(folder / name) for name in arguments]
-    result = CliRunner().invoke(
-        app, [*paths, "--target", "sphere", "--intrinsics", CAMERA, "--json"]
-    )
+    result = rig("measure", *paths, "--target", "sphere", "--intrinsics", CAMERA, "--json")
     assert result.exit_code == 2 and result.stdout == "" and named in result.stderr
 
 
 def test_moments_of_a_cylinder_is_an_error(folder: Path) -> None:
-    result = CliRunner().invoke(
-        app,
-        [str(folder / "pipe.png"), "--target", "cylinder", "--method", "moments",
-         "--intrinsics", CAMERA],
-    )  # fmt: skip
+    result = rig(
+        "measure",
+        str(folder / "pipe.png"),
+        "--target",
+        "cylinder",
+        "--method",
+        "moments",
+        "--intrinsics",
+        CAMERA,
+    )
     assert result.exit_code == 2 and "spheres only" in result.stderr and result.stdout == ""
 
 
 def test_a_damaged_image_is_reported_and_the_others_are_measured(folder: Path) -> None:
-    result = CliRunner().invoke(
-        app,
-        [str(folder / "damaged.png"), str(folder / "sphere.png"), "--target", "sphere",
-         "--intrinsics", CAMERA, "--json"],
-    )  # fmt: skip
+    result = rig(
+        "measure",
+        str(folder / "damaged.png"),
+        str(folder / "sphere.png"),
+        "--target",
+        "sphere",
+        "--intrinsics",
+        CAMERA,
+        "--json",
+    )
     damaged, sphere = (json.loads(line) for line in result.stdout.splitlines())
     assert not damaged["found"] and "damaged" in damaged["reason"]
     assert sphere["found"] and result.exit_code == 2 and "damaged.png" in result.stderr

@@ -1,17 +1,16 @@
 """The paper's experiments on rendered pixels: every curve follows (5); fig. 5 shows its point."""
 
 import json
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from rig.cli import main
 from rig.live import QuietView
 from rig.reproduce import FIGURES, load_experiment, run_curve
 from rig.run import RunResult
+from tests.rig.command_line import rig
 
 CURVES = {
     "fig3": ["case I", "case II"],
@@ -88,16 +87,11 @@ def test_fig_5_turns_the_motion_across_the_axis_in_cases_I_and_III_only(
             assert sigma2 == pytest.approx(speed2, rel=0.01)
 
 
-def test_the_command_prints_one_object_a_curve_and_draws_the_figure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ["rig", "reproduce", "fig5", "--json", "--out", str(tmp_path)]
-    quick = ["--set", "sim.renderer=raster", "--set", "run.duration_s=1"]
-    monkeypatch.setattr(sys, "argv", arguments + quick)
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert not left.value.code
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+def test_the_command_prints_one_object_a_curve_and_draws_the_figure(tmp_path: Path) -> None:
+    quick = ("--set", "sim.renderer=raster", "--set", "run.duration_s=1")
+    result = rig("reproduce", "fig5", "--json", "--out", str(tmp_path), *quick)
+    assert result.exit_code == 0, result.stderr
+    lines = [json.loads(line) for line in result.stdout.splitlines()]
     assert [line["curve"] for line in lines] == CURVES["fig5"]
     for line in lines:
         assert set(line) == {"figure", "curve", "rms_vs_ideal", "radius_m", "relative_error"}
