@@ -23,7 +23,7 @@ class Frame:
     t_exposure_mid_s: float  # mid-exposure
     exposure_s: float
     seq: int  # counts exposures: a gap is a dropped frame
-    stamp_source: str  # "sim", "kernel" or "host"
+    stamp_source: str  # "sim", "kernel", "stream", "replay" or "host"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Serial gantries for ``rig arm``."""
 
+import contextlib
 from collections.abc import Callable
 
 from drivers.clock import Clock
@@ -62,6 +63,9 @@ class GrblKit:
         """Reset and unlock after asking."""
         arm = GrblArm(self._settings, clock)
         try:
+            # What is wrong is explained below; here it only has to be known.
+            with contextlib.suppress(OperateError):
+                _first_state(arm, clock)
             arm.recover(confirm)
             _first_state(arm, clock)
         finally:

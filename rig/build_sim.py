@@ -10,12 +10,14 @@ from sim_backend.rig import SimulatedRig
 
 def build_simulated(config: RigConfig, target: TargetKind, clock: Clock | None) -> Devices:
     """The simulated rig on ``clock``, or on simulated time when that is None."""
+    realtime = clock is not None
     clock = SimulatedClock() if clock is None else clock
     rig = SimulatedRig(config.sim, target, clock)
     return Devices(
         camera=rig.camera,
         arm=rig.arm,
         clock=clock,
+        realtime=realtime,
         intrinsics=Intrinsics(*rig.intrinsics),
         T_tool_camera=rig.T_tool_camera,
         renderer=rig.renderer_name,

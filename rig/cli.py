@@ -5,6 +5,8 @@ import sys
 import typer
 
 from drivers.errors import RigError
+from rig.commands.arm import arm_app
+from rig.commands.camera import camera_app
 from rig.commands.measure import measure
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
@@ -22,6 +24,8 @@ app = typer.Typer(
 app.command(epilog=HELP)(run)
 app.command()(measure)
 app.command(epilog=HELP)(reproduce)
+app.add_typer(camera_app, name="camera")
+app.add_typer(arm_app, name="arm")
 
 
 def main() -> None:

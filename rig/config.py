@@ -3,36 +3,13 @@
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
+from rig.config_devices import ArmConfig, CameraConfig, SimArm, SimCamera
+from rig.config_section import Finite, NotNegative, Positive, Section
 from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
-Vector3 = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class Section(BaseModel):
-    """A level of the tree: unknown keys are errors, values cannot change after loading."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class CameraConfig(Section):
-    """Which camera, and how its images are measured."""
-
-    driver: Literal["sim"] = "sim"
-    method: Literal["limb", "moments"] = "limb"
-
-
-class ArmConfig(Section):
-    """Which arm, and how it is commanded."""
-
-    driver: Literal["sim"] = "sim"
-    # The arm stops by itself this long after the last command: a few missed ticks.
-    hold_s: Positive = 0.05
 
 
 class IntrinsicsConfig(Section):
@@ -115,8 +92,8 @@ class RigConfig(Section):
     """Everything a run depends on."""
 
     name: str = "sim"
-    camera: CameraConfig = CameraConfig()
-    arm: ArmConfig = ArmConfig()
+    camera: CameraConfig = SimCamera()
+    arm: ArmConfig = SimArm()
     calibration: CalibrationConfig = CalibrationConfig()
     estimator: EstimatorConfig = EstimatorConfig()
     motion: MotionConfig = MotionConfig()
@@ -139,7 +116,8 @@ class RigConfig(Section):
                 f"arm.hold_s = {self.arm.hold_s:.3g} is not longer than one tick "
                 f"(1 / run.control_rate_hz = {1.0 / self.run.control_rate_hz:.3g} s)"
             )
-        if self.sim.camera.latency_s >= self.run.duration_s:
+        simulated = self.camera.driver == "sim"
+        if simulated and self.sim.camera.latency_s >= self.run.duration_s:
             raise ValueError(
                 f"sim.camera.latency_s = {self.sim.camera.latency_s:.3g} is not shorter than "
                 f"run.duration_s = {self.run.duration_s:.3g}: no image would arrive in time"

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Any, get_args
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from drivers.errors import ConfigError
 from rig.config import RigConfig, TargetKind
+from rig.config_schema import check_keys, without_drivers
 
 Tree = dict[str, Any]
 
@@ -98,7 +99,7 @@ def _assign(tree: Tree, assignment: str) -> None:
     keys = name.strip().split(".")
     if not equals or not all(keys):
         raise ConfigError(f"--set {assignment!r}: write it as a.b=value")
-    _known_keys_or_error(keys)
+    check_keys(keys, tree)
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError as error:
@@ -121,45 +122,20 @@ def _number_or_text(text: str) -> float | str:
         return text
 
 
-def _known_keys_or_error(keys: list[str]) -> None:
-    """Walk the schema along ``keys``; an unknown one is an error that lists its level's keys."""
-    model: type[BaseModel] | None = RigConfig
-    for depth, key in enumerate(keys):
-        where = ".".join(keys[:depth]) or "the top level"
-        if model is None:
-            raise ConfigError(
-                f"--set {'.'.join(keys)}: {where} is a value and has no keys below it"
-            )
-        if key not in model.model_fields:
-            raise ConfigError(
-                f"unknown key {'.'.join(keys[: depth + 1])!r}; "
-                f"keys of {where}: {', '.join(model.model_fields)}"
-            )
-        model = _section_of(model.model_fields[key].annotation)
-
-
-def _section_of(annotation: object) -> type[BaseModel] | None:
-    for candidate in (annotation, *get_args(annotation)):
-        if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-            return candidate
-    return None
-
-
 def _validate(tree: Tree, where: str) -> RigConfig:
     try:
         return RigConfig.model_validate(tree)
     except ValidationError as error:
-        lines = [_describe(dict(item)) for item in error.errors()]
+        lines = [_describe(dict(item), tree) for item in error.errors()]
         raise ConfigError(f"{where}: " + "; ".join(dict.fromkeys(lines))) from error
 
 
-def _describe(item: Tree) -> str:
+def _describe(item: Tree, tree: Tree) -> str:
     """One validation error as a sentence that starts with the key."""
-    names = [str(part) for part in item["loc"]]
+    names = without_drivers(item["loc"])
     if item["type"] == "extra_forbidden":
-        keys = [name for name in names if not name.isdigit()]
         try:
-            _known_keys_or_error(keys)
+            check_keys([name for name in names if not name.isdigit()], tree)
         except ConfigError as error:
             return str(error)
     message = str(item["msg"]).removeprefix("Value error, ")

@@ -27,7 +27,10 @@ _LEAST_MOTION_M_S = 5e-4
 
 @dataclass(frozen=True, slots=True)
 class JogResult:
-    """What was asked, what was sent, and what the arm measured; twists in the asked frame."""
+    """What was asked, what was sent, and what the arm measured; twists in the asked frame.
+
+    Times are resolved no finer than the arm averages its twists over.
+    """
 
     commanded: FloatArray  # (6,)
     allowed: FloatArray  # (6,) the last one sent

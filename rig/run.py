@@ -51,7 +51,7 @@ def execute(
         warm_up(target, rig.intrinsics, config.camera.method)
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
         tracker = TargetTracker(target, rig.intrinsics, config.camera.method)
-        vision = (ThreadedVision if realtime else InlineVision)(rig.camera, tracker)
+        vision = (ThreadedVision if rig.realtime else InlineVision)(rig.camera, tracker)
         loop = RunLoop(
             clock=rig.clock,
             arm=rig.arm,

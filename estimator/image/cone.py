@@ -77,7 +77,7 @@ def _second(x: float, y: float, dx: float, dy: float, s: FloatArray, a: FloatArr
     square = dx * dx + dy * dy - d_along * d_along
     # Q is a projection: (Q d).(Q p) = d.(Q p).
     mixed = dx * qx + dy * qy
-    return -k * (square - mixed * mixed / q2) / np.sqrt(q2)
+    return float(-k * (square - mixed * mixed / q2) / np.sqrt(q2))
 
 
 @jit

@@ -88,8 +88,10 @@ def _refine(
     if not (np.all(np.isfinite(s0)) and np.all(np.isfinite(a)) and s0 @ s0 > 1.0 and s0[2] > 0.0):
         return None
     camera = np.array(
-        [intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px]
-        + intrinsics.distortion.tolist()
+        [
+            *(intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px),
+            *intrinsics.distortion,
+        ]
     )
     sector_px = _SPHERE_SECTOR_PX if axis0 is None else _CYLINDER_SECTOR_PX
     pixels, starts = collect(image, camera, s0, a, _BAND_PX, _BAND_PX, sector_px)
@@ -98,8 +100,8 @@ def _refine(
     if in_view is None or np.count_nonzero(in_view) < 6:
         return None
     geometry = 3 if axis0 is None else 4
-    s, axis, blur, _, photometry, stats, noise, model, scatter, step_px = solve_outline(
-        pixels, starts, s0, a, geometry, 2
+    s, axis, blur, photometry, stats, noise, model, scatter, step = solve_outline(
+        pixels, starts, s0, a, geometry
     )
     if not (np.all(np.isfinite(s)) and np.all(np.isfinite(scatter))):
         return None
@@ -109,7 +111,7 @@ def _refine(
         s=s,
         covariance=_honest(model, scatter),
         axis=None if axis0 is None else axis,
-        converged=bool(step_px < _CONVERGED_PX),
+        converged=bool(intrinsics.fx_px * _step_rad(step, s) < _CONVERGED_PX),
         blur_px=float(np.sqrt(blur[1])),
         psf_sigma_px=float(np.sqrt(blur[0] / 6.0)),
         noise_grey=float(np.sqrt(noise[0, 0])),
@@ -118,6 +120,11 @@ def _refine(
         in_view_fraction=float(np.mean(in_view)),
         sectors=sectors,
     )
+
+
+def _step_rad(step: FloatArray, s: FloatArray) -> float:
+    """How far a step of the geometry moves the outline, seen from the camera."""
+    return float(abs(step[0]) / (s @ s) + np.sum(np.abs(step[1:3])))
 
 
 def _honest(model: FloatArray, scatter: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from estimator.image.cone import derivatives, distance
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_linear import inverse_diagonal, reduce_normal
 from estimator.image.limb_pixels import DISTANCE, GREY, J0, J1, J2, J3, TAU, X, Y
 from estimator.image.limb_profile import LEAST_WIDTH_PX, edge_profile
 from estimator.jit import jit
@@ -38,11 +39,12 @@ def accumulate(
 ) -> None:  # fmt: skip
     """Fill each sector's reduced information, score, photometry back-substitution and statistics.
 
-    Only every ``stride``-th pixel is used; ``margin_px`` bounds the error of the DISTANCE column. ``noise`` (sectors, 2): variances of reading and of the
-    background. ``information`` (sectors, n, n), ``score`` (sectors, n) with n geometry and blur
-    parameters; ``back`` (sectors, PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step;
-    ``spread`` (sectors, PHOTOMETRY): variances of p. Without ``heavy_tail`` (the degrees of
-    freedom of the residuals) only the photometry is found.
+    Only every ``stride``-th pixel is used; ``margin_px`` bounds the error of the DISTANCE column.
+    ``noise`` (sectors, 2): variances of reading and of the background. ``information`` (sectors,
+    n, n), ``score`` (sectors, n) with n geometry and blur parameters; ``back`` (sectors,
+    PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step; ``spread`` (sectors, PHOTOMETRY):
+    variances of p. Without ``heavy_tail`` (the degrees of freedom of the residuals) only the
+    photometry is found.
     """
     n = score.shape[1]
     width = n + 1  # the last column is a plain shift of the outline, for the sector's own verdict
@@ -52,6 +54,7 @@ def accumulate(
     gpp = np.empty((PHOTOMETRY, PHOTOMETRY))
     rhs = np.empty((PHOTOMETRY, width + 1))
     gtt = np.empty((width, width + 1))
+    fit = np.empty((PHOTOMETRY, width + 1))
     turn = np.array([np.cos(turn_rad), np.sin(turn_rad)])
     reach = (
         margin_px
@@ -99,10 +102,12 @@ def accumulate(
                     rhs[j, width] += wb * grey
                 continue
             _edge_pixel(
-                pixels, i, along, along_step, s, a, frame, blur, turn, p, noise_k, heavy_tail, geometry, basis,
-                column, profile, gpp, rhs, gtt, stats_k,
+                pixels, i, along, along_step, s, a, frame, blur, turn, p, noise_k, heavy_tail,
+                geometry, basis, column, profile, gpp, rhs, gtt, stats_k,
             )  # fmt: skip
-        _eliminate(gpp, rhs, gtt, p, information[k], score[k], back[k], spread[k], stats_k)
+        reduce_normal(gpp, rhs, gtt, p, fit)
+        inverse_diagonal(gpp, spread[k])
+        _store(gtt, fit, information[k], score[k], back[k], stats_k)
 
 
 @jit
@@ -115,7 +120,8 @@ def _weight(r: float, variance: float, heavy_tail: float) -> float:
 
 @jit
 def _edge_pixel(
-    pixels: FloatArray, i: int, along: float, along_step: float, s: FloatArray, a: FloatArray, frame: FloatArray, blur: FloatArray,
+    pixels: FloatArray, i: int, along: float, along_step: float, s: FloatArray,
+    a: FloatArray, frame: FloatArray, blur: FloatArray,
     turn: FloatArray, p: FloatArray, noise: FloatArray, heavy_tail: float, geometry: int,
     basis: FloatArray, column: FloatArray, profile: FloatArray, gpp: FloatArray,
     rhs: FloatArray, gtt: FloatArray, stats: FloatArray,
@@ -185,72 +191,19 @@ def _edge_pixel(
 
 
 @jit
-def _eliminate(
-    gpp: FloatArray, rhs: FloatArray, gtt: FloatArray, p: FloatArray, information: FloatArray,
-    score: FloatArray, back: FloatArray, spread: FloatArray, stats: FloatArray,
+def _store(
+    gtt: FloatArray, fit: FloatArray, information: FloatArray, score: FloatArray,
+    back: FloatArray, stats: FloatArray,
 ) -> None:  # fmt: skip
-    """Schur complement of one sector's photometry."""
-    count, n = PHOTOMETRY, score.shape[0]
-    # The residual's right-hand side for p relative to the present p (the prior's mean is zero).
-    fit = rhs.copy()
-    cholesky(gpp)
-    for j in range(n + 2):
-        solve_column(gpp, fit, j)
-    for m in range(count):
-        for j in range(n):
-            back[m, j] = fit[m, j]
-        back[m, n] = fit[m, n + 1]
-    for j in range(n + 1):
-        total = gtt[j, n + 1]
-        for m in range(count):
-            total -= rhs[m, j] * (fit[m, n + 1] - p[m])
-        gtt[j, n + 1] = total
-        for i in range(j + 1):
-            value = gtt[j, i]
-            for m in range(count):
-                value -= rhs[m, j] * fit[m, i]
-            gtt[j, i] = value
+    """Copy one sector's reduced equations to where the solution expects them."""
+    n = score.shape[0]
     for j in range(n):
         score[j] = gtt[j, n + 1]
         for i in range(j + 1):
             information[j, i] = information[i, j] = gtt[j, i]
-    # The diagonal of the inverse from the columns of the inverted factor.
-    column = np.empty(count)
-    for m in range(count):
-        total = 0.0
-        for i in range(m, count):
-            value = 1.0 if i == m else 0.0
-            for k in range(m, i):
-                value -= gpp[i, k] * column[k]
-            column[i] = value / gpp[i, i]
-            total += column[i] * column[i]
-        spread[m] = total
-    stats[SHIFT_INFO] = max(gtt[n, n], 0.0)
+    for m in range(PHOTOMETRY):
+        for j in range(n):
+            back[m, j] = fit[m, j]
+        back[m, n] = fit[m, n + 1]
+    stats[SHIFT_INFO] = max(float(gtt[n, n]), 0.0)
     stats[SHIFT] = gtt[n, n + 1] / gtt[n, n] if gtt[n, n] > 1e-12 else 0.0
-
-
-@jit
-def cholesky(m: FloatArray) -> None:
-    """Lower Cholesky factor in place (only the lower triangle is read and written)."""
-    for j in range(m.shape[0]):
-        for i in range(j, m.shape[0]):
-            value = m[i, j]
-            for k in range(j):
-                value -= m[i, k] * m[j, k]
-            m[i, j] = np.sqrt(max(value, 1e-12)) if i == j else value / m[j, j]
-
-
-@jit
-def solve_column(factor: FloatArray, columns: FloatArray, j: int) -> None:
-    """Solve in place for column ``j`` with a lower Cholesky factor."""
-    n = factor.shape[0]
-    for i in range(n):
-        value = columns[i, j]
-        for k in range(i):
-            value -= factor[i, k] * columns[k, j]
-        columns[i, j] = value / factor[i, i]
-    for i in range(n - 1, -1, -1):
-        value = columns[i, j]
-        for k in range(i + 1, n):
-            value -= factor[k, i] * columns[k, j]
-        columns[i, j] = value / factor[i, i]

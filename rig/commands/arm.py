@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rig.jog import JogResult
 
 arm_app = typer.Typer(help="Look at an arm, jog it, stop it, bring it back.", no_args_is_help=True)
+_FAR_M = 100.0
 
 ArmName = Annotated[
     Literal["ur", "grbl", "sim"], typer.Option("--arm", help="The kind of arm.", show_default=False)
@@ -62,7 +63,8 @@ def jog(
 ) -> None:
     """Move the arm within the limits and report what it did; Ctrl-C stops it.
 
-    The limits are those of the rig file's `safety` section, the defaults without one.
+    The limits are those of the rig file's `safety` section; without one its default speeds and
+    accelerations, and no workspace.
     """
     from drivers.clock import WallClock
     from rig.jog import jog as run_jog
@@ -124,7 +126,12 @@ def _limits(rig: Path | None, max_state_age_s: float) -> "SafetyConfig":
     from rig.config import SafetyConfig
     from rig.config_load import load_config
 
-    safety = SafetyConfig() if rig is None else load_config("sphere", rig).safety
+    if rig is None:
+        # Where the base frame lies is the rig file's knowledge: without it, no box makes sense.
+        anywhere_m = {"workspace_min_m": (-_FAR_M,) * 3, "workspace_max_m": (_FAR_M,) * 3}
+        safety = SafetyConfig().model_copy(update=anywhere_m)
+    else:
+        safety = load_config("sphere", rig).safety
     oldest_s = max(safety.max_state_age_s, max_state_age_s)
     return safety.model_copy(update={"max_state_age_s": oldest_s})
 

@@ -38,7 +38,10 @@ def run(
         bool, typer.Option("--until-converged", help="End as soon as the estimate has settled.")
     ] = False,
     realtime: Annotated[
-        bool, typer.Option("--realtime", help="Run the simulated rig on the wall clock.")
+        bool,
+        typer.Option(
+            "--realtime", help="Run a simulated rig on the wall clock (real devices always do)."
+        ),
     ] = False,
     seed: Seed = None,
     as_json: AsJson = False,

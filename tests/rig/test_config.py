@@ -104,6 +104,31 @@ def test_a_nonsense_value_is_an_error_that_names_its_key(assignment: str, key: s
     assert key in error_of(assignment)
 
 
+@pytest.mark.parametrize(
+    ("assignments", "words"),
+    [
+        (("arm.driver=ur",), "arm.host"),
+        (("arm.driver=ur", "arm.hots=x"), "host"),
+        (("arm.driver=ur", "arm.host=10.0.0.1", "arm.watchdog_hz=0"), "arm.watchdog_hz = 0"),
+        (("arm.driver=grbl", "arm.port=/dev/x", "arm.baud=1"), "arm.baud = 1"),
+        (("camera.driver=opencv", "camera.source=0", "camera.height=3"), "width"),
+        (("camera.driver=webcam",), "'webcam'"),
+        (("camera.driver=webcam", "camera.source=1"), "camera"),
+        (("arm.host=10.0.0.1",), "hold_s"),
+    ],
+)
+def test_a_drivers_keys_are_checked_as_that_drivers(
+    assignments: tuple[str, ...], words: str
+) -> None:
+    assert words in error_of(*assignments)
+
+
+def test_a_driver_takes_its_own_keys() -> None:
+    config = load_config("sphere", None, ["arm.driver=ur", "arm.host=10.0.0.1", "arm.hold_s=0.06"])
+    assert config.arm.driver == "ur"
+    assert (config.arm.host, config.arm.hold_s) == ("10.0.0.1", 0.06)
+
+
 @pytest.mark.parametrize("assignment", ["sim.seed", "=3", "a..b=1", ""])
 def test_a_malformed_assignment_shows_the_form(assignment: str) -> None:
     assert "a.b=value" in error_of(assignment)

@@ -27,7 +27,8 @@ def tangent_ray(s: np.ndarray, a: np.ndarray, turn: float) -> np.ndarray:
     else:
         across = frame[1] if np.sin(turn) > 0.0 else -frame[1]
         contact = s - frame[2] / length + lean * across + 3.0 * np.cos(turn) * a
-    return contact / contact[2]
+    ray: np.ndarray = contact / contact[2]
+    return ray
 
 
 @BOTH
@@ -107,7 +108,8 @@ def test_the_edge_profile_is_a_step_seen_through_three_boxes(
     widths: tuple[float, float, float],
 ) -> None:
     cells = (np.arange(60) + 0.5) / 60 - 0.5
-    offsets = sum(np.meshgrid(*(cells * w for w in widths), indexing="ij")).ravel()
+    p, q, r = (cells * w for w in widths)
+    offsets = (p[:, None, None] + q[:, None] + r).ravel()
     for d in (-1.3, -0.4, 0.0, 0.35, 1.1, 2.5):
         x = np.maximum(d + offsets, 0.0)
         seen = edge(d, *widths)
