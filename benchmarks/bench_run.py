@@ -20,12 +20,10 @@ RUNS = 5
 
 def main() -> None:
     """Print simulated seconds per wall second: median, least, most."""
-    print(f"{'target':10} {'median':>8} {'min':>8} {'max':>8}   simulated s per wall s, {RUNS} runs")
+    print(f"{'target':10} {'median':>8} {'min':>8} {'max':>8}   sim s per wall s, {RUNS} runs")
     for target in get_args(TargetKind):
         ratios = [_ratio(target) for _ in range(RUNS + 1)][1:]
-        print(
-            f"{target:10} {statistics.median(ratios):8.2f} {min(ratios):8.2f} {max(ratios):8.2f}"
-        )
+        print(f"{target:10} {statistics.median(ratios):8.2f} {min(ratios):8.2f} {max(ratios):8.2f}")
 
 
 def _ratio(target: TargetKind) -> float:

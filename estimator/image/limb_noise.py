@@ -1,0 +1,67 @@
+"""How noisy the pixels and how varied the light around an outline are, learnt from the fit."""
+
+import numpy as np
+
+from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_normal import N_IN, N_OUT, PHOTOMETRY, SS_IN, SS_OUT
+from estimator.jit import jit
+
+_LEAST_READ_VARIANCE = 0.1  # rounding to whole grey levels is 1/12
+
+
+@jit
+def noise_levels(stats: FloatArray, noise: FloatArray, texture_weight: float) -> None:
+    """Reading variance from the inside, background variance per sector from the outside."""
+    sectors = stats.shape[0]
+    inner = np.empty(sectors)
+    count = 0
+    n_in = ss_in = n_out = ss_out = 0.0
+    for k in range(sectors):
+        free_in, free_out = stats[k, N_IN] - 4.0, stats[k, N_OUT] - 3.0
+        if free_in > 3.0:
+            inner[count] = stats[k, SS_IN] / free_in
+            count += 1
+            n_in += free_in
+            ss_in += stats[k, SS_IN]
+        if free_out > 3.0:
+            n_out += free_out
+            ss_out += stats[k, SS_OUT]
+    read = ss_in / max(n_in, 1.0)
+    if count > 0:
+        read = min(read, 1.05 * float(np.median(inner[:count])))
+    read = max(read, _LEAST_READ_VARIANCE)
+    outer = ss_out / max(n_out, 1.0)
+    for k in range(sectors):
+        free_out = max(stats[k, N_OUT] - 3.0, 0.0)
+        local = (stats[k, SS_OUT] + 15.0 * outer) / (free_out + 15.0)
+        noise[k, 0] = read
+        noise[k, 1] = texture_weight * max(local - read, 0.0)
+
+
+@jit
+def learn_ridge(
+    photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray, first: bool
+) -> None:
+    """Learn from all sectors how large slopes and limb terms are here (empirical Bayes).
+
+    ``first``: p was found almost without a prior, so that its own scatter is subtracted, and four
+    standard deviations of what that leaves uncertain are added; later the usual expectation step.
+    """
+    square = np.zeros(PHOTOMETRY)
+    scatter = np.zeros(PHOTOMETRY)
+    count = 0
+    for k in range(photometry.shape[0]):
+        if stats[k, N_IN] + stats[k, N_OUT] < 6.0:
+            continue
+        count += 1
+        for j in range(PHOTOMETRY):
+            square[j] += photometry[k, j] ** 2
+            scatter[j] += spread[k, j]
+    if count == 0:
+        return
+    for j in (1, 2, 4, 5, 6):
+        second = (square[j] + scatter[j]) / count
+        if first:
+            second = max(square[j] - scatter[j], 0.0) / count
+            second += 4.0 * scatter[j] / count * np.sqrt(2.0 / count)
+        ridge[j] = 1.0 / max(second, 1e-4)
