@@ -35,11 +35,14 @@ class Fusion:
 
     def add_states(self, states: list[ArmState]) -> None:
         """Record arm samples and the camera's motion they imply."""
+        if not states:
+            return
+        twists = np.array([state.twist_tool for state in states])
+        self._motion.extend([state.t_s for state in states], twists @ self._camera_from_tool.T)
+        self._data.arm_states.extend(states)
         for state in states:
-            self._motion.append(state.t_s, self._camera_from_tool @ state.twist_tool)
-            self._data.arm_states.append(state)
             self._log.arm(state)
-            self.state = state
+        self.state = states[-1]
 
     def add_sightings(self, sightings: list[Sighting], now_s: float) -> None:
         """Record sightings; those with a feature will correct the estimate."""
