@@ -10,6 +10,7 @@ from rig.commands.camera import camera_app
 from rig.commands.measure import measure
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
+from rig.commands.sim import sim_app
 from rig.exit_codes import HELP, ExitCode, exit_code_of
 
 app = typer.Typer(
@@ -26,6 +27,7 @@ app.command()(measure)
 app.command(epilog=HELP)(reproduce)
 app.add_typer(camera_app, name="camera")
 app.add_typer(arm_app, name="arm")
+app.add_typer(sim_app, name="sim")
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ class StopRequest:
     hangs; the arm then stops through the same clean-up as after a crash.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, notice: str = "stopping the arm …") -> None:
+        self._notice = notice
         self._received = 0
         self._previous: dict[int, object] = {}
 
@@ -41,6 +42,6 @@ class StopRequest:
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self._received += 1
         if self._received == 1:
-            print("\nstopping the arm …", file=sys.stderr, flush=True)
+            print(f"\n{self._notice}", file=sys.stderr, flush=True)
         if self._received >= _INSISTING:
             raise KeyboardInterrupt

@@ -2,9 +2,11 @@
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Protocol
 
 import numpy as np
 
+from drivers.clock import Clock
 from drivers.errors import OperateError
 from drivers.interfaces import Frame
 from sim_backend.config import CameraConfig
@@ -12,10 +14,22 @@ from sim_backend.exposure import Exposure
 from sim_backend.lens import Lens, vignetting_gain
 from sim_backend.renderer import Renderer
 from sim_backend.sensor import expose
-from sim_backend.world import World
 
 # Frames looked at in one go when searching for the newest; jitter never reorders further.
 _JITTER_LIMIT_SIGMAS = 3.0
+
+
+class Timeline(Protocol):
+    """What moves the camera: known up to the present of a clock."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that frames are exposed on."""
+        ...
+
+    def sync(self) -> float:
+        """Make the motion known up to the present, or as far as possible; that instant."""
+        ...
 
 
 class SimulatedCamera:
@@ -32,7 +46,7 @@ class SimulatedCamera:
         self,
         config: CameraConfig,
         lens: Lens,
-        world: World,
+        world: Timeline,
         exposure: Exposure,
         renderer: Renderer,
         seed: int,

@@ -2,13 +2,13 @@
 
 import math
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_backend.config import CameraConfig
 from sim_backend.lens import Lens
-from sim_backend.motion import CameraMotion
 from sim_backend.raster import floor_motion_px
 from sim_backend.renderer import Renderer
 
@@ -22,11 +22,19 @@ _FLOOR_STEP_PX = 1.0
 _BAND_STEP_PX = 0.05
 
 
+class MovingCamera(Protocol):
+    """Where the camera was at any recorded instant."""
+
+    def T_base_camera(self, t_s: float) -> FloatArray:
+        """Pose (4, 4) at ``t_s``."""
+        ...
+
+
 class Exposure:
     """Averages renderings over the exposure time of each row."""
 
     def __init__(
-        self, config: CameraConfig, lens: Lens, motion: CameraMotion, target_m: FloatArray
+        self, config: CameraConfig, lens: Lens, motion: MovingCamera, target_m: FloatArray
     ) -> None:
         self._exposure_s = config.exposure_s
         self._row_time_s = config.row_time_s

@@ -40,7 +40,7 @@ class SimulatedRig:
             raise ConfigError(str(error)) from error
         scene = build_scene(config, target)
         self.renderer_name = choose_renderer(config.renderer)
-        self.T_tool_camera = _mount(config)
+        self.T_tool_camera = mount(config)
         start = getattr(config, target).start
         T_base_tool = start_pose(scene.target, start, lens) @ np.linalg.inv(self.T_tool_camera)
         q_start = joints_for(T_base_tool)
@@ -69,7 +69,8 @@ class SimulatedRig:
         self.camera.close()
 
 
-def _mount(config: SimConfig) -> FloatArray:
+def mount(config: SimConfig) -> FloatArray:
+    """T_tool_camera (4, 4) as the camera is bolted on."""
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec(config.camera.mount_rotvec_rad).as_matrix()
     T[:3, 3] = config.camera.mount_xyz_m

@@ -1,0 +1,83 @@
+"""``rig sim``: an emulated rig behind the real protocols, and faults in it."""
+
+from typing import Annotated, Literal
+
+import typer
+
+from rig.commands.options import Assignments, RigFile, Target, warn
+
+sim_app = typer.Typer(
+    help="An emulated rig behind the real protocols, to try the true drivers on.",
+    no_args_is_help=True,
+)
+Host = Annotated[str, typer.Option(help="A loopback address: 127.0.0.1, 127.0.0.2, …")]
+
+
+@sim_app.command()
+def serve(
+    arm: Annotated[Literal["ur"], typer.Option(help="Which controller: ur (a UR5e).")] = "ur",
+    camera: Annotated[
+        bool, typer.Option("--camera", help="Also stream the camera on its tool (MJPEG).")
+    ] = False,
+    target: Target = "sphere",
+    host: Host = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="The camera stream's port; 0: a free one.")] = 8088,
+    for_s: Annotated[
+        float, typer.Option("--for", min=1.0, max=86400.0, help="Seconds until it ends.")
+    ] = 3600.0,
+    rig: RigFile = None,
+    assignments: Assignments = None,
+) -> None:
+    """Serve an emulated arm, and its camera, in real time until Ctrl-C.
+
+    The UR5e listens as the real controller does: RTDE 30004, scripts 30003, dashboard 29999.
+    """
+    from drivers.clock import WallClock
+    from rig.config_load import load_config, packaged_config
+    from rig.stop_request import StopRequest
+    from sim_backend.loopback_rig.rig import LoopbackRig
+
+    path = packaged_config("loopback_ur5e.yaml") if rig is None else rig
+    config = load_config(target, path, assignments)
+    clock = WallClock()
+    end_s = clock.now_s() + for_s
+    with (
+        StopRequest("ending …") as stop_requested,
+        LoopbackRig(config.sim, target, clock, host, port if camera else None, for_s) as served,
+    ):
+        stream = "" if served.stream is None else f", camera {served.stream.url}"
+        warn(f"serving {arm} at {host}{stream}; Ctrl-C ends it")
+        while clock.now_s() < end_s and not stop_requested():
+            if served.stream is not None and served.stream.error is not None:
+                raise served.stream.error
+            clock.sleep_until(clock.now_s() + 0.1)
+
+
+@sim_app.command()
+def fault(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help="protective_stop, emergency_stop, program_stop, drop, stall, camera_unplug, "
+            "camera_freeze, or clear to end all of them."
+        ),
+    ],
+    after: Annotated[float, typer.Option(min=0.0, help="Seconds from now.")] = 0.0,
+    for_s: Annotated[
+        float, typer.Option("--for", min=0.0, help="Seconds it lasts; 0: until cleared.")
+    ] = 0.0,
+    host: Host = "127.0.0.1",
+) -> None:
+    """Make the emulated rig at HOST fail."""
+    from drivers.errors import ConfigError, ConnectError
+    from sim_backend.loopback_rig.orders import order
+
+    request: dict[str, object] = {"fault": kind, "after_s": after, "for_s": for_s}
+    try:
+        order(host, {"do": "clear"} if kind == "clear" else request)
+    except OSError as error:
+        raise ConnectError(
+            f"no emulated rig answers at {host}: {error}; start one with `rig sim serve`"
+        ) from error
+    except ValueError as error:
+        raise ConfigError(str(error)) from error

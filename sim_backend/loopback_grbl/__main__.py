@@ -1,0 +1,54 @@
+"""``python -m sim_backend.loopback_grbl --link PATH``: the gantry as a process of its own."""
+
+import argparse
+import os
+import sys
+import threading
+from pathlib import Path
+
+from drivers.clock import WallClock
+from sim_backend.loopback_grbl.control import ControlServer, socket_path
+from sim_backend.loopback_grbl.machine import Machine
+from sim_backend.loopback_grbl.server import LoopbackGantry
+
+_LOOK_S = 0.05
+
+
+def main() -> int:
+    """Serve until the lifetime is over or, if asked, until standard input closes."""
+    parser = argparse.ArgumentParser(prog="sim_backend.loopback_grbl")
+    parser.add_argument("--link", type=Path, required=True, help="the port's name, made a link")
+    parser.add_argument("--flavour", choices=["grblHAL", "Grbl"], default="grblHAL")
+    parser.add_argument("--axes", type=int, choices=[3, 4, 5, 6], default=6)
+    parser.add_argument("--baud", type=int, default=115200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--locked", action="store_true", help="in alarm, as after power-up")
+    parser.add_argument("--lifetime-s", type=float, default=3600.0)
+    parser.add_argument("--end-with-stdin", action="store_true")
+    options = parser.parse_args()
+    machine = Machine(
+        flavour=options.flavour, axes=options.axes, baud=options.baud, seed=options.seed
+    )
+    ending = threading.Event()
+    if options.end_with_stdin:
+        threading.Thread(target=_end_with_stdin, args=(ending,), daemon=True).start()
+    clock = WallClock()
+    end_s = clock.now_s() + options.lifetime_s
+    start = machine.column(machine.joint_zero)
+    with LoopbackGantry(machine, start, options.link, clock, options.locked) as gantry:
+        control = ControlServer(gantry, socket_path(options.link))
+        print("ready", flush=True)
+        while clock.now_s() < end_s and not ending.wait(_LOOK_S):
+            gantry.sync()
+        control.close()
+    return 0
+
+
+def _end_with_stdin(ending: threading.Event) -> None:
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    ending.set()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

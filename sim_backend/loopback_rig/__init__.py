@@ -1,0 +1,1 @@
+"""An emulated rig in real time: a loopback controller, and a camera rendered where it moves."""

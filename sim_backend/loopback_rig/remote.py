@@ -1,0 +1,60 @@
+"""The motion of an emulated controller that runs in a process of its own, as a camera needs it."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import Clock
+from sim_backend.history import JointHistory
+
+FloatArray = NDArray[np.float64]
+
+
+class MotionSource(Protocol):
+    """The control connection of a loopback controller."""
+
+    def motion(self, since_s: float) -> FloatArray:
+        """Rows (t_s, q (6), qd (6)), equally spaced, later than an instant."""
+        ...
+
+
+class RemoteMotion:
+    """Follows a controller's true motion, and with it a camera bolted to its tool.
+
+    ``tool_pose`` maps joint positions (6,) to T_base_tool (4, 4). One thread uses it.
+    """
+
+    def __init__(
+        self,
+        source: MotionSource,
+        tool_pose: Callable[[FloatArray], FloatArray],
+        T_tool_camera: FloatArray,
+        clock: Clock,
+    ) -> None:
+        self.clock = clock
+        self._source = source
+        self._tool_pose = tool_pose
+        self._T_tool_camera = T_tool_camera
+        rows = source.motion(0.0)
+        while len(rows) < 2:
+            clock.sleep_until(clock.now_s() + 0.01)
+            rows = source.motion(0.0)
+        self._history = JointHistory(float(rows[0, 0]), float(rows[1, 0] - rows[0, 0]))
+        self._take(rows)
+
+    def sync(self) -> float:
+        """Fetch what is new; the newest recorded instant: a camera must not look further."""
+        newest_s = self._history.time_s(self._history.count - 1)
+        self._take(self._source.motion(newest_s + 0.5 * self._history.step_s))
+        return min(self.clock.now_s(), self._history.time_s(self._history.count - 1))
+
+    def T_base_camera(self, t_s: float) -> FloatArray:
+        """Pose (4, 4) at ``t_s``; raises ValueError outside the recorded motion."""
+        pose: FloatArray = self._tool_pose(self._history.at(t_s)[0]) @ self._T_tool_camera
+        return pose
+
+    def _take(self, rows: FloatArray) -> None:
+        for row in rows:
+            self._history.append(row[1:7], row[7:13])
