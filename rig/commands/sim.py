@@ -1,5 +1,6 @@
 """``rig sim``: an emulated rig behind the real protocols, and faults in it."""
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -15,12 +16,17 @@ Host = Annotated[str, typer.Option(help="A loopback address: 127.0.0.1, 127.0.0.
 
 @sim_app.command()
 def serve(
-    arm: Annotated[Literal["ur"], typer.Option(help="Which controller: ur (a UR5e).")] = "ur",
+    arm: Annotated[
+        Literal["ur", "grbl"], typer.Option(help="A UR5e, or a gantry under grblHAL.")
+    ] = "ur",
     camera: Annotated[
         bool, typer.Option("--camera", help="Also stream the camera on its tool (MJPEG).")
     ] = False,
     target: Target = "sphere",
     host: Host = "127.0.0.1",
+    link: Annotated[
+        Path, typer.Option(help="The gantry's serial port: a link to a pseudo-terminal.")
+    ] = Path("/tmp/activerig-gantry"),
     port: Annotated[int, typer.Option(help="The camera stream's port; 0: a free one.")] = 8088,
     for_s: Annotated[
         float, typer.Option("--for", min=1.0, max=86400.0, help="Seconds until it ends.")
@@ -37,16 +43,19 @@ def serve(
     from rig.stop_request import StopRequest
     from sim_backend.loopback_rig.rig import LoopbackRig
 
-    path = packaged_config("loopback_ur5e.yaml") if rig is None else rig
+    name = "loopback_ur5e.yaml" if arm == "ur" else "loopback_gantry.yaml"
+    path = packaged_config(name) if rig is None else rig
     config = load_config(target, path, assignments)
     clock = WallClock()
     end_s = clock.now_s() + for_s
     with (
         StopRequest("ending …") as stop_requested,
-        LoopbackRig(config.sim, target, clock, host, port if camera else None, for_s) as served,
+        LoopbackRig(
+            arm, config.sim, target, clock, host, link, port if camera else None, for_s
+        ) as served,
     ):
         stream = "" if served.stream is None else f", camera {served.stream.url}"
-        warn(f"serving {arm} at {host}{stream}; Ctrl-C ends it")
+        warn(f"serving {arm} at {host if arm == 'ur' else link}{stream}; Ctrl-C ends it")
         while clock.now_s() < end_s and not stop_requested():
             if served.stream is not None and served.stream.error is not None:
                 raise served.stream.error
@@ -58,8 +67,9 @@ def fault(
     kind: Annotated[
         str,
         typer.Argument(
-            help="protective_stop, emergency_stop, program_stop, drop, stall, camera_unplug, "
-            "camera_freeze, or clear to end all of them."
+            help="UR: protective_stop, emergency_stop, program_stop, drop, stall. Gantry: alarm, "
+            "door, hold, emergency_stop, reset, stall, drop. Camera: camera_unplug, "
+            "camera_freeze, camera_repeat. clear ends all of them."
         ),
     ],
     after: Annotated[float, typer.Option(min=0.0, help="Seconds from now.")] = 0.0,

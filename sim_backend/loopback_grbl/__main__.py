@@ -6,6 +6,8 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
+
 from drivers.clock import WallClock
 from sim_backend.loopback_grbl.control import ControlServer, socket_path
 from sim_backend.loopback_grbl.machine import Machine
@@ -24,6 +26,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--locked", action="store_true", help="in alarm, as after power-up")
     parser.add_argument("--lifetime-s", type=float, default=3600.0)
+    parser.add_argument("--q-start", type=_numbers, help="joints in m and rad; default: zero")
     parser.add_argument("--end-with-stdin", action="store_true")
     options = parser.parse_args()
     machine = Machine(
@@ -34,7 +37,8 @@ def main() -> int:
         threading.Thread(target=_end_with_stdin, args=(ending,), daemon=True).start()
     clock = WallClock()
     end_s = clock.now_s() + options.lifetime_s
-    start = machine.column(machine.joint_zero)
+    q_start = np.zeros(6) if options.q_start is None else np.array(options.q_start)
+    start = machine.machine_position(q_start)
     with LoopbackGantry(machine, start, options.link, clock, options.locked) as gantry:
         control = ControlServer(gantry, socket_path(options.link))
         print("ready", flush=True)
@@ -42,6 +46,13 @@ def main() -> int:
             gantry.sync()
         control.close()
     return 0
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    values = tuple(float(part) for part in text.split(","))
+    if len(values) != 6:
+        raise argparse.ArgumentTypeError("six numbers separated by commas")
+    return values
 
 
 def _end_with_stdin(ending: threading.Event) -> None:

@@ -4,23 +4,27 @@ import ipaddress
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self, cast, get_args
+from typing import Literal, Protocol, Self, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.errors import ConfigError, ConnectError
+from sim_backend import kinematics as gantry_kinematics
 from sim_backend.camera import SimulatedCamera
 from sim_backend.config import SimConfig
 from sim_backend.exposure import Exposure
 from sim_backend.lens import lens_of
 from sim_backend.loopback_camera.server import Fault, MjpegServer
+from sim_backend.loopback_grbl.process import LoopbackGantryProcess
 from sim_backend.loopback_rig.orders import OrderServer
 from sim_backend.loopback_rig.remote import MotionSource, RemoteMotion
-from sim_backend.loopback_ur.kinematics import HOME_Q, joints_for, tool_pose
+from sim_backend.loopback_ur import kinematics as ur_kinematics
 from sim_backend.loopback_ur.process import LoopbackProcess
 from sim_backend.render_choice import choose_renderer, make_renderer
 from sim_backend.rig import mount
@@ -28,7 +32,7 @@ from sim_backend.scene import Sphere, TargetKind, build_scene
 from sim_backend.start import start_pose
 
 FloatArray = NDArray[np.float64]
-CAMERA_PORT = 8088
+ArmKind = Literal["ur", "grbl"]
 
 
 class Control(MotionSource, Protocol):
@@ -39,68 +43,91 @@ class Control(MotionSource, Protocol):
     def clear(self) -> None: ...
 
 
-class LoopbackRig:
-    """A UR5e and, if asked for, the camera on its tool, until closed.
+@dataclass(frozen=True, slots=True)
+class _Emulated:
+    """A running controller and how its joints place the tool."""
 
-    Raises ConfigError for a start the arm cannot reach, ConnectError for ports already taken.
+    control: Control
+    tool_pose: Callable[[FloatArray], FloatArray]
+
+
+class LoopbackRig:
+    """An emulated arm and, if asked for, the camera on its tool, until closed.
+
+    ``arm`` is "ur" (a UR5e on the controller's own ports of ``host``) or "grbl" (a gantry on a
+    pseudo-terminal at ``link``). Raises ConfigError for a start the arm cannot reach,
+    ConnectError for ports already taken.
     """
 
     def __init__(
         self,
+        arm: ArmKind,
         config: SimConfig,
         target: TargetKind,
         clock: Clock,
         host: str,
+        link: Path,
         camera_port: int | None,
         lifetime_s: float,
     ) -> None:
         _check_loopback(host)
         self._stack = ExitStack()
+        self.stream: MjpegServer | None = None
         try:
-            self._open(config, target, clock, host, camera_port, lifetime_s)
+            emulated = self._start(arm, _start_pose(config, target), host, link, lifetime_s)
+            self._control = emulated.control
+            if camera_port is not None:
+                self._serve_camera(config, target, clock, emulated, host, camera_port)
+            orders = OrderServer(host, self)
+            self._stack.callback(orders.close)
         except OSError as error:
             self.close()
             raise ConnectError(
                 f"the emulated rig cannot start on {host}: {error}; is another one running?"
             ) from error
+        except ValueError as error:
+            self.close()
+            raise ConfigError(f"the arm cannot reach sim.{target}.start: {error}") from error
         except BaseException:
             self.close()
             raise
 
-    def _open(
+    def _start(
+        self, arm: ArmKind, T_base_tool: FloatArray, host: str, link: Path, lifetime_s: float
+    ) -> _Emulated:
+        if arm == "ur":
+            T_flange_tool = np.eye(4)
+            q = ur_kinematics.joints_for(T_base_tool, ur_kinematics.HOME_Q, T_flange_tool)
+            ur = self._stack.enter_context(
+                LoopbackProcess(host, lifetime_s, q_start=tuple(q.tolist()))
+            )
+            pose = partial(ur_kinematics.tool_pose, T_flange_tool=T_flange_tool)
+            return _Emulated(ur.control, pose)
+        q = gantry_kinematics.joints_for(T_base_tool)
+        start = "--q-start=" + ",".join(repr(float(value)) for value in q)
+        gantry = self._stack.enter_context(
+            LoopbackGantryProcess(link, (start, f"--lifetime-s={lifetime_s}"))
+        )
+        return _Emulated(gantry.control, gantry_kinematics.tool_pose)
+
+    def _serve_camera(
         self,
         config: SimConfig,
         target: TargetKind,
         clock: Clock,
+        emulated: _Emulated,
         host: str,
-        camera_port: int | None,
-        lifetime_s: float,
+        port: int,
     ) -> None:
         lens, scene = lens_of(config.camera), build_scene(config, target)
-        T_tool_camera = mount(config)
-        view = getattr(config, target).start
-        T_base_tool = start_pose(scene.target, view, lens) @ np.linalg.inv(T_tool_camera)
-        try:
-            q_start = joints_for(T_base_tool, HOME_Q, np.eye(4))
-        except ValueError as error:
-            raise ConfigError(f"the arm cannot reach sim.{target}.start: {error}") from error
-        process = self._stack.enter_context(
-            LoopbackProcess(host, lifetime_s, q_start=tuple(q_start.tolist()))
-        )
-        self._control: Control = process.control
-        self.stream: MjpegServer | None = None
-        if camera_port is not None:
-            pose = partial(tool_pose, T_flange_tool=np.eye(4))
-            motion = RemoteMotion(process.control, pose, T_tool_camera, clock)
-            seen = scene.target
-            centre_m = seen.centre_m if isinstance(seen, Sphere) else seen.middle_m
-            renderer = make_renderer(choose_renderer(config.renderer), scene, lens)
-            exposure = Exposure(config.camera, lens, motion, centre_m)
-            camera = SimulatedCamera(config.camera, lens, motion, exposure, renderer, config.seed)
-            self._stack.callback(camera.close)
-            self.stream = self._stack.enter_context(MjpegServer(camera.read, host, camera_port))
-        orders = OrderServer(host, self)
-        self._stack.callback(orders.close)
+        renderer = make_renderer(choose_renderer(config.renderer), scene, lens)
+        motion = RemoteMotion(emulated.control, emulated.tool_pose, mount(config), clock)
+        seen = scene.target
+        centre_m = seen.centre_m if isinstance(seen, Sphere) else seen.middle_m
+        exposure = Exposure(config.camera, lens, motion, centre_m)
+        camera = SimulatedCamera(config.camera, lens, motion, exposure, renderer, config.seed)
+        self._stack.callback(camera.close)
+        self.stream = self._stack.enter_context(MjpegServer(camera.read, host, port))
 
     def fault(self, name: str, after_s: float, for_s: float) -> None:
         """Order a fault of the camera or of the arm; raises ValueError for an unknown one."""
@@ -134,6 +161,14 @@ class LoopbackRig:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _start_pose(config: SimConfig, target: TargetKind) -> FloatArray:
+    """T_base_tool (4, 4) from which the camera sees the target as configured."""
+    lens, scene = lens_of(config.camera), build_scene(config, target)
+    T_base_camera = start_pose(scene.target, getattr(config, target).start, lens)
+    T_base_tool: FloatArray = T_base_camera @ np.linalg.inv(mount(config))
+    return T_base_tool
 
 
 def _check_loopback(host: str) -> None:
