@@ -25,6 +25,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.bench_sim
 	$(BIN)/python -m benchmarks.bench_run
 	$(BIN)/python -m benchmarks.bench_camera
+	$(BIN)/python -m benchmarks.bench_ur
+	$(BIN)/python -m benchmarks.bench_grbl
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

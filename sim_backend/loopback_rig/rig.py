@@ -21,11 +21,12 @@ from sim_backend.config import SimConfig
 from sim_backend.exposure import Exposure
 from sim_backend.lens import lens_of
 from sim_backend.loopback_camera.server import Fault, MjpegServer
+from sim_backend.loopback_grbl.control import ControlClient
 from sim_backend.loopback_grbl.process import LoopbackGantryProcess
 from sim_backend.loopback_rig.orders import OrderServer
 from sim_backend.loopback_rig.remote import MotionSource, RemoteMotion
 from sim_backend.loopback_ur import kinematics as ur_kinematics
-from sim_backend.loopback_ur.process import LoopbackProcess
+from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
 from sim_backend.render_choice import choose_renderer, make_renderer
 from sim_backend.rig import mount
 from sim_backend.scene import Sphere, TargetKind, build_scene
@@ -35,7 +36,7 @@ FloatArray = NDArray[np.float64]
 ArmKind = Literal["ur", "grbl"]
 
 
-class Control(MotionSource, Protocol):
+class Control(Protocol):
     """What the emulated controllers offer from outside their process."""
 
     def fault(self, name: str, after_s: float = 0.0, for_s: float = 0.0) -> None: ...
@@ -48,6 +49,7 @@ class _Emulated:
     """A running controller and how its joints place the tool."""
 
     control: Control
+    motion: MotionSource  # a connection of the camera's own
     tool_pose: Callable[[FloatArray], FloatArray]
 
 
@@ -102,13 +104,17 @@ class LoopbackRig:
                 LoopbackProcess(host, lifetime_s, q_start=tuple(q.tolist()))
             )
             pose = partial(ur_kinematics.tool_pose, T_flange_tool=T_flange_tool)
-            return _Emulated(ur.control, pose)
+            source = LoopbackControl(host)
+            self._stack.callback(source.close)
+            return _Emulated(ur.control, source, pose)
         q = gantry_kinematics.joints_for(T_base_tool)
         start = "--q-start=" + ",".join(repr(float(value)) for value in q)
         gantry = self._stack.enter_context(
             LoopbackGantryProcess(link, (start, f"--lifetime-s={lifetime_s}"))
         )
-        return _Emulated(gantry.control, gantry_kinematics.tool_pose)
+        client = ControlClient(link)
+        self._stack.callback(client.close)
+        return _Emulated(gantry.control, client, gantry_kinematics.tool_pose)
 
     def _serve_camera(
         self,
@@ -121,7 +127,7 @@ class LoopbackRig:
     ) -> None:
         lens, scene = lens_of(config.camera), build_scene(config, target)
         renderer = make_renderer(choose_renderer(config.renderer), scene, lens)
-        motion = RemoteMotion(emulated.control, emulated.tool_pose, mount(config), clock)
+        motion = RemoteMotion(emulated.motion, emulated.tool_pose, mount(config), clock)
         seen = scene.target
         centre_m = seen.centre_m if isinstance(seen, Sphere) else seen.middle_m
         exposure = Exposure(config.camera, lens, motion, centre_m)

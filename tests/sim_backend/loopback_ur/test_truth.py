@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 from drivers.clock import WallClock
 from sim_backend.clock import SimulatedClock
 from sim_backend.history import JointHistory
+from sim_backend.loopback_rig.remote import RemoteMotion
 from sim_backend.loopback_ur.controller import Controller, ControllerConfig
 from sim_backend.loopback_ur.kinematics import HOME_Q, tool_pose, transform
 from sim_backend.loopback_ur.motion import STEP_S
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
-from sim_backend.loopback_ur.remote_truth import RemoteTruth
 from sim_backend.loopback_ur.truth import ArmCameraMotion, ArmTruth
 from tests.drivers.ur.loopback import start_loopback
 
@@ -58,11 +58,11 @@ def test_nothing_is_known_outside_the_record():
 
 def test_another_process_sees_the_same_and_stays_up_to_date(loopback):
     control = LoopbackControl(loopback.host)
-    truth = RemoteTruth(control, np.eye(4), CLOCK)
-    first_s = truth.sync()
+    motion = RemoteMotion(control, lambda q: tool_pose(q, np.eye(4)), T_TOOL_CAMERA, CLOCK)
+    first_s = motion.sync()
     CLOCK.sleep_until(first_s + 0.1)
-    newest_s = truth.sync()
+    newest_s = motion.sync()
     assert first_s < newest_s <= CLOCK.now_s()
-    assert np.allclose(truth.T_base_tool(newest_s), tool_pose(HOME_Q + 0.1, np.eye(4)))
-    assert np.allclose(truth.twist_base(newest_s), 0.0)
+    expected = tool_pose(HOME_Q + 0.1, np.eye(4)) @ T_TOOL_CAMERA
+    assert np.allclose(motion.T_base_camera(newest_s), expected)
     control.close()
