@@ -32,7 +32,9 @@ def make_run_dir(out: Path | None, target: TargetKind) -> Path:
         path.mkdir(parents=True, exist_ok=out is not None)
         if (path / SUMMARY_NAME).exists() or (path / LOG_NAME).exists():
             raise ConfigError(f"{path} already holds a run: choose another --out")
+        # Only tried: a run whose devices cannot be opened leaves nothing that blocks the next.
         (path / LOG_NAME).touch()
+        (path / LOG_NAME).unlink()
     except OSError as error:
         raise ConfigError(f"cannot write the run directory {path}: {error}") from error
     return path

@@ -39,6 +39,10 @@ def test_a_directory_that_holds_a_run_is_not_written_over(tmp_path: Path) -> Non
         make_run_dir(run_dir, "sphere")
 
 
+def test_a_directory_whose_run_never_began_can_be_used_again(tmp_path: Path) -> None:
+    assert make_run_dir(tmp_path / "run", "sphere") == make_run_dir(tmp_path / "run", "sphere")
+
+
 def test_an_existing_empty_directory_is_used(tmp_path: Path) -> None:
     assert make_run_dir(tmp_path, "sphere") == tmp_path
 
