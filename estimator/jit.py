@@ -13,6 +13,8 @@ import numba
 F = TypeVar("F", bound=Callable[..., object])
 
 _OPTIONS = {"nogil": True, "error_model": "numpy"}
+# Sums may be reordered and divisions shared, so that the compiler works on several numbers at once.
+_REORDERED = frozenset({"contract", "reassoc", "nsz", "arcp"})
 _VERSIONS_KEPT = 4
 
 
@@ -22,12 +24,27 @@ def jit(function: F) -> F:
     The compiled code is cached in the user's cache directory. Where that cannot be written it
     goes beside the source, and where neither can be, each process compiles anew.
     """
+    return _compiled(function)
+
+
+def jit_sums(function: F) -> F:
+    """As `jit`, for kernels whose sums may be taken in any order: not where NaN is compared."""
+    return _compiled(function, fastmath=_REORDERED)
+
+
+def jit_inlined(function: F) -> F:
+    """As `jit_sums`, for what a loop of `jit_sums` calls: only then it takes several at a time."""
+    return _compiled(function, fastmath=_REORDERED, forceinline=True)
+
+
+def _compiled(function: F, fastmath: frozenset[str] = frozenset(), forceinline: bool = False) -> F:
+    options = {**_OPTIONS, "fastmath": set(fastmath), "forceinline": forceinline}
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = _CACHE_DIR
     try:
-        return cast(F, numba.njit(cache=True, **_OPTIONS)(function))
+        return cast(F, numba.njit(cache=True, **options)(function))
     except RuntimeError:  # no place to cache in
-        return cast(F, numba.njit(**_OPTIONS)(function))
+        return cast(F, numba.njit(**options)(function))
     finally:
         numba.config.CACHE_DIR = before
 

@@ -17,12 +17,12 @@ from estimator.image.limb_normal import (
     SHIFT_INFO,
 )
 from estimator.image.limb_pixels import collect
-from estimator.image.limb_solve import solve_outline
+from estimator.image.limb_solve import solve_outline, step_rad
 
 GreyImage = NDArray[np.uint8]
 
 _BAND_PX = 6.0
-_SPHERE_SECTOR_PX, _CYLINDER_SECTOR_PX = 12.0, 16.0
+_SPHERE_SECTOR_PX, _CYLINDER_SECTOR_PX = 12.0, 22.0
 _CONVERGED_PX = 0.02
 # A sector is usable when its contrast stands out of the noise, it alone would put the edge near
 # where the others do, and its residuals across the edge are about as large as they should be.
@@ -96,7 +96,7 @@ def _refine(
     sector_px = _SPHERE_SECTOR_PX if axis0 is None else _CYLINDER_SECTOR_PX
     pixels, starts = collect(image, camera, s0, a, _BAND_PX, _BAND_PX, sector_px)
     counts = np.diff(starts)
-    in_view = counts > 0.4 * max(float(np.median(counts[counts > 0])), 1.0) if len(pixels) else None
+    in_view = counts > 0.4 * max(float(np.median(counts[counts > 0])), 1.0) if starts[-1] else None
     if in_view is None or np.count_nonzero(in_view) < 6:
         return None
     geometry = 3 if axis0 is None else 4
@@ -111,7 +111,7 @@ def _refine(
         s=s,
         covariance=_honest(model, scatter),
         axis=None if axis0 is None else axis,
-        converged=bool(intrinsics.fx_px * _step_rad(step, s) < _CONVERGED_PX),
+        converged=bool(intrinsics.fx_px * step_rad(step, s) < _CONVERGED_PX),
         blur_px=float(np.sqrt(blur[1])),
         psf_sigma_px=float(np.sqrt(blur[0] / 6.0)),
         noise_grey=float(np.sqrt(noise[0, 0])),
@@ -120,11 +120,6 @@ def _refine(
         in_view_fraction=float(np.mean(in_view)),
         sectors=sectors,
     )
-
-
-def _step_rad(step: FloatArray, s: FloatArray) -> float:
-    """How far a step of the geometry moves the outline, seen from the camera."""
-    return float(abs(step[0]) / (s @ s) + np.sum(np.abs(step[1:3])))
 
 
 def _honest(model: FloatArray, scatter: FloatArray) -> FloatArray:
@@ -141,8 +136,8 @@ def _sectors(
     shift = -stats[in_view, SHIFT]
     shift_std = 1.0 / np.sqrt(np.maximum(stats[in_view, SHIFT_INFO], 1e-12))
     chi2 = stats[in_view, CHI_EDGE] / np.maximum(stats[in_view, N_EDGE], 1.0)
-    sums = np.add.reduceat(pixels[:, :2], np.minimum(starts[:-1], len(pixels) - 1), axis=0)
-    centres = intrinsics.project(sums[in_view] / np.diff(starts)[in_view, None])
+    sums = np.add.reduceat(pixels[:2], np.minimum(starts[:-1], starts[-1] - 1), axis=1)
+    centres = intrinsics.project(sums.T[in_view] / np.diff(starts)[in_view, None])
     sign = 1.0 if np.median(contrast) > 0.0 else -1.0
     least = max(_LEAST_CONTRAST_GREY, _LEAST_CONTRAST_SD * float(np.sqrt(noise[0, 0])))
     usable = (

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.image.intrinsics import FloatArray
-from estimator.jit import jit
+from estimator.jit import jit_sums
 
 
-@jit
+@jit_sums
 def cholesky(m: FloatArray) -> None:
     """Lower Cholesky factor in place (only the lower triangle is read and written)."""
     for j in range(m.shape[0]):
@@ -18,7 +18,7 @@ def cholesky(m: FloatArray) -> None:
             m[i, j] = np.sqrt(max(value, 1e-12)) if i == j else value / m[j, j]
 
 
-@jit
+@jit_sums
 def solve_column(factor: FloatArray, columns: FloatArray, j: int) -> None:
     """Solve in place for column ``j`` with a lower Cholesky factor."""
     n = factor.shape[0]
@@ -34,7 +34,7 @@ def solve_column(factor: FloatArray, columns: FloatArray, j: int) -> None:
         columns[i, j] = value / factor[i, i]
 
 
-@jit
+@jit_sums
 def inverse_diagonal(factor: FloatArray, out: FloatArray) -> None:
     """Diagonal of the inverse of the matrix with this lower Cholesky factor into ``out``."""
     count = factor.shape[0]
@@ -50,7 +50,7 @@ def inverse_diagonal(factor: FloatArray, out: FloatArray) -> None:
         out[m] = total
 
 
-@jit
+@jit_sums
 def reduce_normal(
     gpp: FloatArray, rhs: FloatArray, gtt: FloatArray, p: FloatArray, fit: FloatArray
 ) -> None:
@@ -62,20 +62,48 @@ def reduce_normal(
     (lower triangle and last column) in gtt and gpp^-1 rhs in ``fit``.
     """
     count, others = gpp.shape[0], gtt.shape[0]
-    fit[:] = rhs
     cholesky(gpp)
-    for j in range(others + 1):
-        solve_column(gpp, fit, j)
-    for j in range(others):
-        for m in range(count):
+    fit[:] = rhs
+    _solve_half(gpp, fit)
+    for m in range(count):
+        for j in range(others):
+            half = fit[m, j]
+            for i in range(j + 1):
+                gtt[j, i] -= half * fit[m, i]
             # The prior's mean of p is zero, hence the step of p from its present value.
-            gtt[j, others] -= rhs[m, j] * (fit[m, others] - p[m])
-        for i in range(j + 1):
-            for m in range(count):
-                gtt[j, i] -= rhs[m, j] * fit[m, i]
+            gtt[j, others] -= half * fit[m, others] - rhs[m, j] * p[m]
+    _solve_other_half(gpp, fit)
 
 
-@jit
+@jit_sums
+def _solve_half(factor: FloatArray, columns: FloatArray) -> None:
+    """Columns times the inverse of the lower Cholesky factor, row by row, in place."""
+    width = columns.shape[1]
+    for i in range(factor.shape[0]):
+        for k in range(i):
+            times = factor[i, k]
+            for j in range(width):
+                columns[i, j] -= times * columns[k, j]
+        inverse = 1.0 / factor[i, i]
+        for j in range(width):
+            columns[i, j] *= inverse
+
+
+@jit_sums
+def _solve_other_half(factor: FloatArray, columns: FloatArray) -> None:
+    """Columns times the inverse of the factor's transpose, row by row, in place."""
+    width = columns.shape[1]
+    for i in range(factor.shape[0] - 1, -1, -1):
+        for k in range(i + 1, factor.shape[0]):
+            times = factor[k, i]
+            for j in range(width):
+                columns[i, j] -= times * columns[k, j]
+        inverse = 1.0 / factor[i, i]
+        for j in range(width):
+            columns[i, j] *= inverse
+
+
+@jit_sums
 def solve_fixed(
     matrix: FloatArray, rhs: FloatArray, fixed: NDArray[np.bool_], value: FloatArray
 ) -> FloatArray:

@@ -3,7 +3,8 @@
 import numpy as np
 
 from estimator.image.intrinsics import FloatArray
-from estimator.image.limb_normal import N_IN, N_OUT, PHOTOMETRY, SS_IN, SS_OUT
+from estimator.image.limb_edge import PHOTOMETRY
+from estimator.image.limb_normal import N_IN, N_OUT, SS_IN, SS_OUT
 from estimator.jit import jit
 
 _LEAST_READ_VARIANCE = 0.1  # rounding to whole grey levels is 1/12

@@ -13,184 +13,189 @@ place along the line, -1 to 1. Each sector's photometry is eliminated on the spo
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.image.cone import derivatives, distance
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_edge import (
+    ALL_ROWS,
+    BLUR,
+    E_BEND,
+    E_D,
+    E_GEOMETRY,
+    E_NU,
+    E_NV,
+    E_TAU,
+    MODEL_ROWS,
+    MOST_PIXELS,
+    PHOTOMETRY,
+    R_BLUR,
+    R_GEOMETRY,
+    R_GREY,
+    R_RESIDUAL,
+    WEIGHT,
+    WEIGHTED,
+    edge_rows,
+)
 from estimator.image.limb_linear import inverse_diagonal, reduce_normal
-from estimator.image.limb_pixels import DISTANCE, GREY, J0, J1, J2, J3, TAU, X, Y
-from estimator.image.limb_profile import LEAST_WIDTH_PX, edge_profile
-from estimator.jit import jit
+from estimator.image.limb_pixels import BEND, DISTANCE, GEOMETRY, GREY, NU, NV, TAU
+from estimator.jit import jit_sums
 
-PHOTOMETRY = 7
-BLUR = 6
-# Motion narrower than this is differentiated as if it were this wide: nearer to zero the
-# derivative is a spike between the pixels.
-_SMOOTH_WIDTH_PX = 0.7
 # Columns of the sector statistics.
 N_OUT, SS_OUT, N_IN, SS_IN, N_EDGE, CHI_EDGE, SHIFT, SHIFT_INFO, STATS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+_VECTOR = 32
 
 
-@jit
+@jit_sums
 def accumulate(
-    pixels: FloatArray, starts: NDArray[np.int64], stride: int, s: FloatArray, a: FloatArray,
-    frame: FloatArray, blur: FloatArray, turn_rad: float, photometry: FloatArray,
-    noise: FloatArray, ridge: FloatArray, heavy_tail: float, geometry: int, margin_px: float,
-    information: FloatArray, score: FloatArray, back: FloatArray, spread: FloatArray,
-    stats: FloatArray,
+    pixels: FloatArray, starts: NDArray[np.int64], stride: int, moved_by: FloatArray,
+    blur: FloatArray, turn_rad: float, photometry: FloatArray, noise: FloatArray,
+    ridge: FloatArray, heavy_tail: float, margin_px: float, information: FloatArray,
+    score: FloatArray, back: FloatArray, spread: FloatArray, stats: FloatArray,
 ) -> None:  # fmt: skip
     """Fill each sector's reduced information, score, photometry back-substitution and statistics.
 
-    Only every ``stride``-th pixel is used; ``margin_px`` bounds the error of the DISTANCE column.
-    ``noise`` (sectors, 2): variances of reading and of the background. ``information`` (sectors,
+    Only every ``stride``-th pixel is used; ``moved_by`` (geometry,) is how far the geometry is from
+    that at which the pixels were located, ``margin_px`` bounds the outline's error. ``noise``
+    (sectors, 2): variances of reading and of the background. ``information`` (sectors,
     n, n), ``score`` (sectors, n) with n geometry and blur parameters; ``back`` (sectors,
     PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step; ``spread`` (sectors, PHOTOMETRY):
-    variances of p. Without ``heavy_tail`` (the degrees of freedom of the residuals) only the
-    photometry is found.
+    variances of p. ``heavy_tail``: the degrees of freedom of the residuals, 0 when p is unknown.
     """
     n = score.shape[1]
+    geometry = n - BLUR
     width = n + 1  # the last column is a plain shift of the outline, for the sector's own verdict
-    basis = np.empty(PHOTOMETRY)
-    column = np.zeros(geometry + BLUR + 1)
-    profile = np.empty(8)
+    rows = np.zeros(ALL_ROWS * MOST_PIXELS)
+    outside, inside = rows.copy(), rows.copy()
+    gram = np.empty((MODEL_ROWS, MODEL_ROWS))
+    at = np.empty(width, dtype=np.int64)  # the rows of the shared parameters
+    for j in range(width):
+        at[j] = R_GEOMETRY + j if j < geometry else R_BLUR + j - geometry
     gpp = np.empty((PHOTOMETRY, PHOTOMETRY))
     rhs = np.empty((PHOTOMETRY, width + 1))
     gtt = np.empty((width, width + 1))
     fit = np.empty((PHOTOMETRY, width + 1))
     turn = np.array([np.cos(turn_rad), np.sin(turn_rad)])
+    along = np.empty(2)
     reach = (
         margin_px
         + 0.5 * np.sqrt(blur[0] * 2.0 + 1.0)
         + 0.5 * np.sqrt(max(blur[1] + abs(blur[2]) + blur[4] + abs(blur[5]), 0.0))
     )
     stats[:] = 0.0
-    along_step = 4.0 / (starts.shape[0] - 1)
+    per_line = (starts.shape[0] - 1) // 2
+    along[1] = 2.0 / max(per_line, 1)
     for k in range(starts.shape[0] - 1):
         p, noise_k, stats_k = photometry[k], noise[k], stats[k]
-        along = (k % ((starts.shape[0] - 1) // 2) + 0.5) * along_step - 1.0
-        gpp[:] = 0.0
-        rhs[:] = 0.0
-        gtt[:] = 0.0
+        along[0] = (k % max(per_line, 1) + 0.5) * along[1] - 1.0
+        n_edge, n_out, n_in = _parted(
+            pixels, starts[k], starts[k + 1], stride, moved_by, reach, rows, outside, inside
+        )
+        stats_k[N_EDGE], stats_k[CHI_EDGE] = edge_rows(
+            rows, n_edge, along, blur, turn, p, noise_k, heavy_tail, geometry
+        )
+        _gram(rows, n_edge, MODEL_ROWS, gram)
         for i in range(PHOTOMETRY):
-            gpp[i, i] = ridge[i]
-        for i in range(starts[k], starts[k + 1], stride):
-            tau, grey, d0 = pixels[i, TAU], pixels[i, GREY], pixels[i, DISTANCE]
-            if d0 < -reach:
-                r = grey - p[0] - p[1] * tau - p[2] * d0
-                stats_k[N_OUT] += 1.0
-                stats_k[SS_OUT] += r * r
-                weight = _weight(r, noise_k[0] + noise_k[1], heavy_tail)
-                wt, wd = weight * tau, weight * d0
-                gpp[0, 0] += weight
-                gpp[1, 0] += wt
-                gpp[1, 1] += wt * tau
-                gpp[2, 0] += wd
-                gpp[2, 1] += wd * tau
-                gpp[2, 2] += wd * d0
-                rhs[0, width] += weight * grey
-                rhs[1, width] += wt * grey
-                rhs[2, width] += wd * grey
-                continue
-            if d0 > reach:
-                basis[3], basis[4], basis[5], basis[6] = 1.0, tau, d0, np.sqrt(d0)
-                r = grey - p[3] - p[4] * tau - p[5] * d0 - p[6] * basis[6]
-                stats_k[N_IN] += 1.0
-                stats_k[SS_IN] += r * r
-                weight = _weight(r, noise_k[0], heavy_tail)
-                for j in range(3, PHOTOMETRY):
-                    wb = weight * basis[j]
-                    for m in range(3, j + 1):
-                        gpp[j, m] += wb * basis[m]
-                    rhs[j, width] += wb * grey
-                continue
-            _edge_pixel(
-                pixels, i, along, along_step, s, a, frame, blur, turn, p, noise_k, heavy_tail,
-                geometry, basis, column, profile, gpp, rhs, gtt, stats_k,
-            )  # fmt: skip
+            for j in range(i + 1):
+                gpp[i, j] = gram[i, j]
+            gpp[i, i] += ridge[i]
+            for j in range(width):
+                rhs[i, j] = gram[at[j], i]
+            rhs[i, width] = gram[R_GREY, i]
+        for j in range(width):
+            for i in range(j + 1):
+                gtt[j, i] = gram[at[j], at[i]]
+            gtt[j, width] = gram[R_RESIDUAL, at[j]]
+        stats_k[N_OUT], stats_k[N_IN] = float(n_out), float(n_in)
+        stats_k[SS_OUT] = _weights(outside, n_out, p[:3], noise_k[0] + noise_k[1], heavy_tail)
+        _gram(outside, n_out, 4, gram)
+        _add_side(gram, 0, 3, gpp, rhs)
+        stats_k[SS_IN] = _weights(inside, n_in, p[3:], noise_k[0], heavy_tail)
+        _gram(inside, n_in, 5, gram)
+        _add_side(gram, 3, 4, gpp, rhs)
         reduce_normal(gpp, rhs, gtt, p, fit)
-        inverse_diagonal(gpp, spread[k])
+        if stride == 1:
+            inverse_diagonal(gpp, spread[k])
         _store(gtt, fit, information[k], score[k], back[k], stats_k)
 
 
-@jit
-def _weight(r: float, variance: float, heavy_tail: float) -> float:
-    """Inverse variance, reduced where the residual is far out (Student's t)."""
+@jit_sums
+def _parted(
+    pixels: FloatArray, start: int, stop: int, stride: int, moved_by: FloatArray, reach: float,
+    edge: FloatArray, outside: FloatArray, inside: FloatArray,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Sort a sector's pixels into those across the outline, outside and inside; their numbers."""
+    n_edge = n_out = n_in = 0
+    for i in range(start, stop, stride):
+        d = pixels[DISTANCE, i]
+        for j in range(moved_by.shape[0]):
+            d += moved_by[j] * pixels[GEOMETRY + j, i]
+        tau, grey = pixels[TAU, i], pixels[GREY, i]
+        if d < -reach and n_out < MOST_PIXELS:
+            outside[n_out], outside[MOST_PIXELS + n_out] = 1.0, tau
+            outside[2 * MOST_PIXELS + n_out], outside[3 * MOST_PIXELS + n_out] = d, grey
+            n_out += 1
+        elif d > reach and n_in < MOST_PIXELS:
+            inside[n_in], inside[MOST_PIXELS + n_in] = 1.0, tau
+            inside[2 * MOST_PIXELS + n_in], inside[3 * MOST_PIXELS + n_in] = d, np.sqrt(d)
+            inside[4 * MOST_PIXELS + n_in] = grey
+            n_in += 1
+        elif abs(d) <= reach and n_edge < MOST_PIXELS:
+            edge[E_TAU * MOST_PIXELS + n_edge], edge[R_GREY * MOST_PIXELS + n_edge] = tau, grey
+            edge[E_D * MOST_PIXELS + n_edge] = d
+            edge[E_NU * MOST_PIXELS + n_edge] = pixels[NU, i]
+            edge[E_NV * MOST_PIXELS + n_edge] = pixels[NV, i]
+            edge[E_BEND * MOST_PIXELS + n_edge] = pixels[BEND, i]
+            for j in range(moved_by.shape[0]):
+                edge[(E_GEOMETRY + j) * MOST_PIXELS + n_edge] = pixels[GEOMETRY + j, i]
+            n_edge += 1
+    return n_edge, n_out, n_in
+
+
+@jit_sums
+def _weights(
+    rows: FloatArray, count: int, p: FloatArray, variance: float, heavy_tail: float
+) -> float:
+    """Inverse variances, reduced where the residual is far out (Student's t); sum of squares."""
+    terms = p.shape[0]
+    total = 0.0
+    for i in range(count):
+        r = rows[terms * MOST_PIXELS + i]
+        for j in range(terms):
+            r -= p[j] * rows[j * MOST_PIXELS + i]
+        total += r * r
+        rows[WEIGHT * MOST_PIXELS + i] = (heavy_tail + 1.0) / (heavy_tail * variance + r * r)
     if heavy_tail <= 0.0:
-        return 1.0 / variance
-    return (heavy_tail + 1.0) / (heavy_tail * variance + r * r)
+        rows[WEIGHT * MOST_PIXELS : WEIGHT * MOST_PIXELS + count] = 1.0 / variance
+    return total
 
 
-@jit
-def _edge_pixel(
-    pixels: FloatArray, i: int, along: float, along_step: float, s: FloatArray,
-    a: FloatArray, frame: FloatArray, blur: FloatArray,
-    turn: FloatArray, p: FloatArray, noise: FloatArray, heavy_tail: float, geometry: int,
-    basis: FloatArray, column: FloatArray, profile: FloatArray, gpp: FloatArray,
-    rhs: FloatArray, gtt: FloatArray, stats: FloatArray,
-) -> None:  # fmt: skip
-    """Add one pixel whose kernel may reach the outline."""
-    width = gtt.shape[0]
-    x, y, tau, grey = pixels[i, X], pixels[i, Y], pixels[i, TAU], pixels[i, GREY]
-    xu, xv, yu, yv = pixels[i, J0], pixels[i, J1], pixels[i, J2], pixels[i, J3]
-    d, nu, nv, bend, steep = distance(x, y, xu, xv, yu, yv, s, a)
-    n1 = turn[0] * nu + turn[1] * nv
-    n2 = turn[0] * nv - turn[1] * nu if geometry == 3 else n1 * (along + tau * along_step)
-    w2 = (blur[1] * n1 + 2.0 * blur[3] * n2 + blur[2]) * n1 + (blur[4] * n2 + blur[5]) * n2
-    across2 = blur[1] * n2 * n2 - 2.0 * blur[3] * n1 * n2 + blur[4] * n1 * n1
-    # A bent edge covers less of a kernel that is wide along it.
-    d_seen = d - bend * (1.0 + 2.0 * blur[0] + max(across2, 0.0)) / 24.0
-    bw = np.sqrt(max(w2, LEAST_WIDTH_PX**2))
-    ba = max(np.sqrt(nu * nu + blur[0]), LEAST_WIDTH_PX)
-    bb = max(np.sqrt(nv * nv + blur[0]), LEAST_WIDTH_PX)
-    edge_profile(d_seen, ba, bb, bw, profile)
-    share = profile[0]
-    out = 1.0 - share
-    basis[0], basis[1], basis[2] = out, out * tau, d_seen - profile[4]
-    basis[3], basis[4], basis[5], basis[6] = share, share * tau, profile[4], profile[5]
-    model = 0.0
-    for j in range(PHOTOMETRY):
-        model += p[j] * basis[j]
-    r = grey - model
-    variance = noise[0] + out * out * noise[1]
-    weight = _weight(r, variance, heavy_tail)
-    for j in range(PHOTOMETRY):
-        wb = weight * basis[j]
+@jit_sums
+def _gram(rows: FloatArray, count: int, used: int, out: FloatArray) -> None:
+    """Weighted scalar products of the first ``used`` rows into the lower triangle of ``out``."""
+    # Up to whole vectors of the processor, with pixels of no weight.
+    padded = min((count + _VECTOR - 1) // _VECTOR * _VECTOR, MOST_PIXELS)
+    for i in range(count, padded):
+        rows[WEIGHT * MOST_PIXELS + i] = 0.0
+    for j in range(used):
+        for i in range(padded):
+            rows[WEIGHTED * MOST_PIXELS + i] = (
+                rows[WEIGHT * MOST_PIXELS + i] * rows[j * MOST_PIXELS + i]
+            )
         for m in range(j + 1):
-            gpp[j, m] += wb * basis[m]
-        rhs[j, width] += wb * grey
-    if not 0.0 < share < 1.0 or heavy_tail <= 0.0:
-        return
-    stats[N_EDGE] += 1.0
-    stats[CHI_EDGE] += r * r / variance
-    contrast = p[3] + p[4] * tau - p[0] - p[1] * tau
-    rise = p[5] - p[2]
-    c1 = profile[1]
-    by_d = contrast * c1 + p[2] + rise * share + p[6] * profile[6]
-    by_bend = by_d * bend / 24.0
-    if bw < _SMOOTH_WIDTH_PX:
-        edge_profile(d_seen, ba, bb, _SMOOTH_WIDTH_PX, profile)
-    by_w2 = contrast * profile[2] + rise * c1 / 24.0
-    by_var = contrast * profile[3] + 0.5 * rise * c1
-    foot_x = x - d * (xu * nu + xv * nv)
-    foot_y = y - d * (yu * nu + yv * nv)
-    derivatives(foot_x, foot_y, s, a, frame, geometry, column)
-    for j in range(geometry):
-        column[j] *= by_d / steep
-    column[geometry] = by_var / 6.0 - 2.0 * by_bend
-    column[geometry + 1] = by_w2 * n1 * n1 - by_bend * n2 * n2
-    column[geometry + 2] = by_w2 * n1
-    column[geometry + 3] = 2.0 * (by_w2 + by_bend) * n1 * n2
-    column[geometry + 4] = by_w2 * n2 * n2 - by_bend * n1 * n1
-    column[geometry + 5] = by_w2 * n2
-    column[width - 1] = by_d
-    for j in range(width):
-        wc = weight * column[j]
-        for m in range(PHOTOMETRY):
-            rhs[m, j] += wc * basis[m]
-        for m in range(j + 1):
-            gtt[j, m] += wc * column[m]
-        gtt[j, width] += wc * r
+            total = 0.0
+            for i in range(padded):
+                total += rows[WEIGHTED * MOST_PIXELS + i] * rows[m * MOST_PIXELS + i]
+            out[j, m] = total
 
 
-@jit
+@jit_sums
+def _add_side(gram: FloatArray, first: int, terms: int, gpp: FloatArray, rhs: FloatArray) -> None:
+    """Add the products of one side's pixels to the photometry's equations."""
+    for i in range(terms):
+        for j in range(i + 1):
+            gpp[first + i, first + j] += gram[i, j]
+        rhs[first + i, rhs.shape[1] - 1] += gram[terms, i]
+
+
+@jit_sums
 def _store(
     gtt: FloatArray, fit: FloatArray, information: FloatArray, score: FloatArray,
     back: FloatArray, stats: FloatArray,

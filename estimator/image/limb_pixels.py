@@ -7,8 +7,10 @@ from estimator.image.cone import distance, outline_frame
 from estimator.image.intrinsics import FloatArray
 from estimator.jit import jit
 
-# Columns of a collected pixel.
-X, Y, J0, J1, J2, J3, GREY, SECTOR, TAU, DISTANCE, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10
+# Rows of the collected pixels: ray and its Jacobian, grey, place along the sector; then, filled by
+# `locate`, distance to the outline, inward normal, curvature, derivatives by the geometry.
+X, Y, J0, J1, J2, J3, GREY, TAU, DISTANCE, NU, NV, BEND, GEOMETRY, ROWS = *range(13), 16
+_COARSE_PX, _TILE_PX, _SMALL_TILE_PX = 32, 8, 2
 _NEWTON_STEPS = 12
 _MOST_SECTORS = 256
 
@@ -54,69 +56,105 @@ def ray_of_pixel(u: float, v: float, camera: FloatArray, out: FloatArray) -> Non
 
 @jit
 def collect(
-    image: NDArray[np.uint8],
-    camera: FloatArray,
-    s: FloatArray,
-    a: FloatArray,
-    inner_px: float,
-    outer_px: float,
-    sector_px: float,
-) -> tuple[FloatArray, NDArray[np.int64]]:
+    image: NDArray[np.uint8], camera: FloatArray, s: FloatArray, a: FloatArray,
+    inner_px: float, outer_px: float, sector_px: float,
+) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
     """Pixels from ``outer_px`` outside to ``inner_px`` inside the outline of (s, a), by sector.
 
-    Of a cylinder, whose outline is long, about half of the pixels are taken, without a pattern:
-    a chessboard would meet lines at 45 degrees always in the same phase. Returns the pixels (n,
-    COLUMNS) and the first index of each sector (sectors + 1,). A sector is about ``sector_px`` of
-    the outline's length; TAU runs from -0.5 to 0.5 along it.
+    Returns the pixels (ROWS, n) and the first index of each sector (sectors + 1,). A sector is
+    about ``sector_px`` of the outline's length; TAU runs from -0.5 to 0.5 along it.
     """
     height, width = image.shape
-    count = 0
     frame = outline_frame(s, a)
     sphere = a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0
     guide = _sector_guide(camera, s, frame, sphere, sector_px, height, width)
-    sectors = int(guide[5])
     # Half as much again as the band's area; lines may cross the image obliquely.
-    density = 1.5 if sphere else 0.8
-    found = np.empty((int(density * (guide[6] + 50.0) * (inner_px + outer_px + 2.0)), COLUMNS))
+    most = int(1.6 * (guide[6] + 50.0) * (inner_px + outer_px + 2.0))
+    found = np.empty((most, 2), dtype=np.int64)
+    taus = np.empty(most)
     # In the target's middle the distance is meaningless: never skip far there.
-    k = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2 - 1.0)
-    inside_skip = max(0.4 * camera[0] / k, 1.0)
+    inside_skip = 0.4 * camera[0] / np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2 - 1.0)
+    tile = _TILE_PX if inside_skip > 1.5 * _TILE_PX else _SMALL_TILE_PX
+    count = 0
+    near = np.empty(5)
     ray = np.zeros(6)
-    row = 0
-    while row < height:
-        col = 0
-        nearest = 1e9
-        ray[0], ray[1] = -camera[2] / camera[0], (row - camera[3]) / camera[1]
-        while col < width:
-            ray_of_pixel(float(col), float(row), camera, ray)
-            d, _, _, _, _ = distance(ray[0], ray[1], ray[2], ray[3], ray[4], ray[5], s, a)
-            beyond = min(d - inner_px, inside_skip) if d > 0.0 else -outer_px - d
-            nearest = min(nearest, beyond)
-            if beyond > 0.0:
-                col += max(1, int(0.8 * beyond))
-                continue
-            if count < found.shape[0]:
-                for j in range(6):
-                    found[count, j] = ray[j]
-                found[count, GREY] = image[row, col]
-                sector, tau = _sector_of(float(col), float(row), ray, guide, s, frame, sphere)
-                found[count, SECTOR] = sector
-                found[count, TAU] = tau
-                found[count, DISTANCE] = d
-                count += 1
-            col += 1
-            while not sphere and not _drawn(row, col):
-                col += 1
-        row += 1 if nearest <= 0.0 else max(1, int(0.8 * nearest))
-    return _by_sector(found[:count], sectors)
+    for block in range(((height - 1) // _COARSE_PX + 1) * ((width - 1) // _COARSE_PX + 1)):
+        across = (width - 1) // _COARSE_PX + 1
+        top, left = block // across * _COARSE_PX, block % across * _COARSE_PX
+        _look(top, left, _COARSE_PX, camera, s, a, ray, near)
+        if _beyond(near[0], inner_px, outer_px, inside_skip) > 0.75 * _COARSE_PX:
+            continue
+        for v in range(top, min(top + _COARSE_PX, height), tile):
+            for u in range(left, min(left + _COARSE_PX, width), tile):
+                _look(v, u, tile, camera, s, a, ray, near)
+                if _beyond(near[0], inner_px, outer_px, inside_skip) > 0.75 * tile:
+                    continue
+                count = _take(
+                    v, u, tile, height, width, near, ray, inner_px, outer_px, guide, s, frame,
+                    sphere, found, taus, count,
+                )  # fmt: skip
+    return _by_sector(image, camera, found[:count], taus, int(guide[5]))
 
 
 @jit
-def _drawn(row: int, col: int) -> bool:
-    """Whether a pixel belongs to the fixed, patternless half of the image."""
-    mixed = (row * 0x9E3779B1 + col * 0x85EBCA6B) & 0xFFFFFFFF
-    mixed = ((mixed ^ (mixed >> 15)) * 0x2C1B3C6D) & 0xFFFFFFFF
-    return bool((mixed >> 16) & 1)
+def _look(
+    top: int, left: int, size: int, camera: FloatArray, s: FloatArray, a: FloatArray,
+    ray: FloatArray, near: FloatArray,
+) -> None:  # fmt: skip
+    """`distance` at the middle of a square of pixels into ``near`` (5,)."""
+    middle = 0.5 * (size - 1)
+    ray_of_pixel(left + middle, top + middle, camera, ray)
+    near[0], near[1], near[2], near[3], near[4] = distance(
+        ray[0], ray[1], ray[2], ray[3], ray[4], ray[5], s, a
+    )
+
+
+@jit
+def _beyond(d: float, inner_px: float, outer_px: float, inside_skip: float) -> float:
+    """How far outside the band a place at distance ``d`` surely is."""
+    return min(d - inner_px, inside_skip) if d > 0.0 else -outer_px - d
+
+
+@jit
+def _take(
+    top: int, left: int, tile: int, height: int, width: int, near: FloatArray, ray: FloatArray,
+    inner_px: float, outer_px: float, guide: FloatArray, s: FloatArray, frame: FloatArray,
+    sphere: bool, found: NDArray[np.int64], taus: FloatArray, count: int,
+) -> int:  # fmt: skip
+    """Note index, sector and TAU of a tile's pixels in the band; the new count."""
+    middle = 0.5 * (tile - 1)
+    cu, cv = left + middle - guide[0], top + middle - guide[1]
+    sectors = int(guide[5])
+    per_side = sectors // 2
+    second = 0
+    if sphere:
+        start = np.arctan2(cv, cu) + np.pi
+    else:
+        start = 0.5 * per_side + (cu * guide[2] + cv * guide[3]) * guide[4]
+        if not ray[0] * frame[1, 0] + ray[1] * frame[1, 1] + frame[1, 2] > 0.0:
+            second = per_side
+    d, nu, nv, bend = near[0], near[1], near[2], near[3]
+    for v in range(top, min(top + tile, height)):
+        for u in range(left, min(left + tile, width)):
+            du, dv = u - left - middle, v - top - middle
+            t = nu * dv - nv * du
+            here = d + nu * du + nv * dv - 0.5 * bend * t * t
+            if here < -outer_px or here > inner_px or count == found.shape[0]:
+                continue
+            if sphere:
+                # Angle from the tile's middle: its tangent is small, its arc two terms of it.
+                x = (cu * dv - cv * du) / (cu * (cu + du) + cv * (cv + dv))
+                place = (start + x - x * x * x / 3.0) * guide[4]
+                place = place - sectors if place >= sectors else place
+                place = place + sectors if place < 0.0 else place
+                sector = min(int(place), sectors - 1)
+            else:
+                place = start + (du * guide[2] + dv * guide[3]) * guide[4]
+                sector = min(max(int(place), 0), per_side - 1)
+            found[count, 0], found[count, 1] = v * width + u, sector + second
+            taus[count] = place - sector - 0.5
+            count += 1
+    return count
 
 
 @jit
@@ -150,47 +188,27 @@ def _sector_guide(
 
 
 @jit
-def _sector_of(
-    u: float, v: float, ray: FloatArray, guide: FloatArray, s: FloatArray, frame: FloatArray,
-    sphere: bool,
-) -> tuple[int, float]:  # fmt: skip
-    """The sector of a pixel and where in it (-0.5 to 0.5) it lies."""
-    du, dv = u - guide[0], v - guide[1]
-    if sphere:
-        place = (np.arctan2(dv, du) + np.pi) * guide[4]
-        sector = min(int(place), int(guide[5]) - 1)
-        return sector, place - sector - 0.5
-    per_side = int(guide[5]) // 2
-    place = (du * guide[2] + dv * guide[3]) * guide[4] + 0.5 * per_side
-    sector = min(max(int(place), 0), per_side - 1)
-    tau = place - sector - 0.5
-    across = ray[0] * frame[1, 0] + ray[1] * frame[1, 1] + frame[1, 2]
-    return (sector if across > 0.0 else sector + per_side), tau
-
-
-@jit
-def _by_sector(found: FloatArray, sectors: int) -> tuple[FloatArray, NDArray[np.int64]]:
-    """``found`` reordered so that each sector's pixels are contiguous."""
+def _by_sector(
+    image: NDArray[np.uint8], camera: FloatArray, found: NDArray[np.int64], taus: FloatArray,
+    sectors: int,
+) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
+    """The found pixels with their rays and grey, so that each sector's are contiguous."""
+    width = image.shape[1]
     starts = np.zeros(sectors + 1, dtype=np.int64)
     for i in range(found.shape[0]):
-        starts[int(found[i, SECTOR]) + 1] += 1
+        starts[found[i, 1] + 1] += 1
     for k in range(sectors):
         starts[k + 1] += starts[k]
     place = starts.copy()
-    ordered = np.empty_like(found)
+    pixels = np.empty((ROWS, found.shape[0]))
+    ray = np.zeros(6)
     for i in range(found.shape[0]):
-        k = int(found[i, SECTOR])
-        for j in range(COLUMNS):
-            ordered[place[k], j] = found[i, j]
-        place[k] += 1
-    return ordered, starts
-
-
-@jit
-def refresh_distances(pixels: FloatArray, s: FloatArray, a: FloatArray) -> None:
-    """Put each pixel's distance to the outline of (s, a) into its DISTANCE column."""
-    for i in range(pixels.shape[0]):
-        pixels[i, DISTANCE] = distance(
-            pixels[i, X], pixels[i, Y], pixels[i, J0], pixels[i, J1], pixels[i, J2], pixels[i, J3],
-            s, a,
-        )[0]  # fmt: skip
+        v, u = found[i, 0] // width, found[i, 0] % width
+        at = place[found[i, 1]]
+        place[found[i, 1]] += 1
+        ray_of_pixel(float(u), float(v), camera, ray)
+        for j in range(6):
+            pixels[j, at] = ray[j]
+        pixels[GREY, at] = image[v, u]
+        pixels[TAU, at] = taus[i]
+    return pixels, starts

@@ -5,22 +5,27 @@ from numpy.typing import NDArray
 
 from estimator.image.cone import moved, outline_frame
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_edge import BLUR, PHOTOMETRY
 from estimator.image.limb_linear import cholesky, solve_column, solve_fixed
+from estimator.image.limb_locate import locate
 from estimator.image.limb_noise import learn_ridge, noise_levels
-from estimator.image.limb_normal import BLUR, PHOTOMETRY, STATS, accumulate
-from estimator.image.limb_pixels import refresh_distances
+from estimator.image.limb_normal import STATS, accumulate
 from estimator.jit import jit
 
 # Prior of the blur parameters (q, M1, h1, M12, M2, h2): sharp to 4 px of motion are likely.
 _BLUR_MEAN = np.array([0.2, 0.5, 0.0, 0.0, 0.5, 0.0])
 _BLUR_SD = np.array([2.0, 8.0, 1.0, 8.0, 8.0, 1.0])
+# Between sharp and 3 px of motion: both are reached from there in few steps.
+_BLUR_START = np.array([0.3, 1.5, 0.0, 0.0, 1.5, 0.0])
 _WIDE_Q = 4.0  # widens the model's edge at first, so that a wrong guess is within its reach
 _HEAVY_TAIL = 30.0
-# Texture is correlated: its variance counts twice where all pixels are used (sphere), once where
-# every other one is (cylinder).
+# Texture is correlated: its variance counts twice. Not along a cylinder's long sectors, where once
+# gave the smaller error on textures of 2 to 8 px.
 _TEXTURE_WEIGHT_SPHERE, _TEXTURE_WEIGHT_CYLINDER = 2.0, 1.0
-# The steps: geometry alone, then blur as well on a part of the pixels, then everything on all.
-_GEOMETRY_STEPS, _COARSE_STEPS, _ALL_STEPS = 2, 4, 7
+# The steps: geometry alone, then blur as well on a part of the pixels, then everything on all. The
+# photometry's spread is learnt in the first of these only: the slow rest of it brings nothing.
+_GEOMETRY_STEPS, _COARSE_STEPS, _LEARNING_STEPS, _ALL_STEPS = 1, 3, 2, 9
+_CONVERGED_RAD = 1e-5
 _COARSE_STRIDE, _COARSE_MARGIN_PX, _FINE_MARGIN_PX = 4, 1.2, 0.3
 # Inverse prior variances of the photometry. Slopes and limb terms start stiff: they could stand
 # in for a blur not yet found. Then they are free, for their true spread to be learnt.
@@ -51,18 +56,20 @@ def solve_outline(
     blur, turn_rad = _first_blur(s, a, geometry)
     ridge = _STIFF.copy()
     total, step, frame = np.eye(n), np.zeros(n), outline_frame(s, a)
+    s_there, a_there, moved_by = s, a, np.zeros(geometry)
+    locate(pixels, s, a, frame)
     for index in range(-1, _ALL_STEPS):
         fine = index >= _COARSE_STEPS
-        frame = outline_frame(s, a)
         accumulate(
-            pixels, starts, 1 if fine else _COARSE_STRIDE, s, a, frame, blur, turn_rad, photometry,
-            noise, ridge, 0.0 if index < 0 else _HEAVY_TAIL, geometry,
+            pixels, starts, 1 if fine else _COARSE_STRIDE, moved_by, blur, turn_rad, photometry,
+            noise, ridge, 0.0 if index < 0 else _HEAVY_TAIL,
             _FINE_MARGIN_PX if fine else _COARSE_MARGIN_PX, information, score, back, spread,
             stats,
         )  # fmt: skip
         if index >= 0:
             total, step = _step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
-            s, a = moved(s, a, frame, step[:geometry])
+            moved_by += step[:geometry]
+            s, a = moved(s_there, a_there, frame, moved_by)
             blur += step[geometry:]
             turn_rad = _diagonalised(blur, turn_rad, geometry == 3)
             noise_levels(stats, noise, texture_weight)
@@ -72,15 +79,27 @@ def solve_outline(
             break
         _back_substitute(back, step, photometry)
         if index == _GEOMETRY_STEPS - 1:
-            blur[0] = _BLUR_MEAN[0]
+            blur[:] = _BLUR_START
+            if geometry == 4:
+                blur[1], blur[4] = blur[1] + blur[4], 0.0
         if index == _COARSE_STEPS - 1:
             ridge = _FREE.copy()
         if index == _GEOMETRY_STEPS - 1 or index == _COARSE_STEPS - 1:
-            refresh_distances(pixels, s, a)
-        if fine:
+            s_there, a_there, frame, moved_by = s, a, outline_frame(s, a), np.zeros(geometry)
+            locate(pixels, s, a, frame)
+        if fine and index < _COARSE_STEPS + _LEARNING_STEPS:
             learn_ridge(photometry, spread, stats, ridge, index == _COARSE_STEPS)
+        if index >= _COARSE_STEPS + _LEARNING_STEPS and step_rad(step, s) < _CONVERGED_RAD:
+            break
     model, scatter = _covariances(total, information, score, frame, s)
     return s, a, blur, photometry, stats, noise, model, scatter, step
+
+
+@jit
+def step_rad(step: FloatArray, s: FloatArray) -> float:
+    """How far a step of the geometry moves the outline, seen from the camera."""
+    turn = abs(step[1]) + abs(step[2])
+    return float(turn + abs(step[0]) / (s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
 
 
 @jit

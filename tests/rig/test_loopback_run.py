@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rig.config_load import packaged_config
 from tests.rig.command_line import rig
 
 pytestmark = pytest.mark.slow
@@ -62,7 +63,7 @@ def test_a_ur_through_its_vendors_package_finds_the_radius(tmp_path: Path) -> No
     with served("--arm", "ur", "--host", host) as stream:
         result = rig(
             *("run", "--target", "sphere", "--json", "--out", str(tmp_path)),
-            *("--rig", "configs/loopback_ur5e.yaml"),
+            *("--rig", str(packaged_config("loopback_ur5e.yaml"))),
             *("--set", f"arm.host={host}", "--set", f"camera.source={stream}"),
         )
     assert result.exit_code == 0, result.stderr
@@ -74,7 +75,7 @@ def test_a_serial_gantry_finds_the_radius(tmp_path: Path) -> None:
     with served("--arm", "grbl", "--link", str(link), "--host", free_host()) as stream:
         result = rig(
             *("run", "--target", "sphere", "--json", "--out", str(tmp_path / "run")),
-            *("--rig", "configs/loopback_gantry.yaml"),
+            *("--rig", str(packaged_config("loopback_gantry.yaml"))),
             *("--set", f"arm.port={link}", "--set", f"camera.source={stream}"),
         )
     assert result.exit_code == 0, result.stderr

@@ -5,8 +5,9 @@ import pytest
 
 from estimator.image.cone import derivatives, distance, moved, outline_frame, side
 from estimator.image.intrinsics import Intrinsics
-from estimator.image.limb_pixels import ray_of_pixel
-from estimator.image.limb_profile import edge_profile
+from estimator.image.limb_locate import locate
+from estimator.image.limb_pixels import BEND, DISTANCE, GEOMETRY, NU, NV, collect, ray_of_pixel
+from estimator.image.limb_profile import edge_rise, edge_step
 
 SPHERE = (np.array([1.2, -0.8, 12.0]), np.zeros(3))
 _AXIS = np.array([0.8, 0.55, 0.24]) / np.linalg.norm([0.8, 0.55, 0.24])
@@ -97,10 +98,45 @@ def test_rays_and_their_jacobian_invert_the_lens() -> None:
         assert ray[2:] == pytest.approx([du[0], dv[0], du[1], dv[1]], abs=1e-8)
 
 
+@BOTH
+def test_collected_pixels_are_those_near_the_outline_and_are_located_as_by_the_cone(
+    s: np.ndarray, a: np.ndarray
+) -> None:
+    camera = np.array([LENS.fx_px, LENS.fy_px, LENS.cx_px, LENS.cy_px, *LENS.distortion])
+    frame, count = outline_frame(s, a), 4 if a.any() else 3
+    pixels, starts = collect(np.zeros((480, 640), np.uint8), camera, s, a, 5.0, 6.0, 14.0)
+    locate(pixels, s, a, frame)
+    assert starts[-1] == pixels.shape[1]
+    d = pixels[DISTANCE]
+    assert d.min() > -6.1 and d.max() < 5.1
+    v, u = (grid.ravel().astype(float) for grid in np.mgrid[:480, :640])
+    x, y = LENS.normalise(np.stack([u, v], axis=-1)).T
+    near = 0
+    for i in range(0, len(u), 37):
+        ray = np.array([x[i], y[i], 0.0, 0.0, 0.0, 0.0])
+        ray_of_pixel(u[i], v[i], camera, ray)
+        d_here = distance(ray[0], ray[1], ray[2], ray[3], ray[4], ray[5], s, a)[0]
+        near += -5.9 < d_here < 4.9
+    inner = np.count_nonzero((d > -5.9) & (d < 4.9))
+    assert near == pytest.approx(inner / 37, rel=0.1)
+    derived = np.empty(count)
+    for i in range(0, pixels.shape[1], 211):
+        x0, y0, x_u, x_v, y_u, y_v = pixels[:6, i]
+        expected = distance(x0, y0, x_u, x_v, y_u, y_v, s, a)
+        found = pixels[[DISTANCE, NU, NV, BEND], i]
+        assert found == pytest.approx(expected[:4], abs=1e-9)
+        nu, nv = expected[1:3]
+        foot_x = x0 - expected[0] * (x_u * nu + x_v * nv)
+        foot_y = y0 - expected[0] * (y_u * nu + y_v * nv)
+        derivatives(foot_x, foot_y, s, a, frame, count, derived)
+        assert pixels[GEOMETRY : GEOMETRY + count, i] == pytest.approx(
+            derived / expected[4], abs=1e-8
+        )
+
+
 def edge(d: float, a: float, b: float, w: float) -> np.ndarray:
-    out = np.empty(8)
-    edge_profile(d, a, b, w, out)
-    return out
+    """Share, its derivatives by d, w^2 and variance, rise, root and the root's derivative."""
+    return np.array([*edge_step(d, a, b, w), *edge_rise(d, a, b, w)])
 
 
 @pytest.mark.parametrize("widths", [(0.7, 0.7, 3.0), (1.0, 0.05, 0.05), (0.9, 0.4, 1.2)])
