@@ -89,7 +89,7 @@ def solve_outline(
             locate(pixels, s, a, frame)
         if fine and index < _COARSE_STEPS + _LEARNING_STEPS:
             learn_ridge(photometry, spread, stats, ridge, index == _COARSE_STEPS)
-        if index >= _COARSE_STEPS + _LEARNING_STEPS and step_rad(step, s) < _CONVERGED_RAD:
+        if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and step_rad(step, s) < _CONVERGED_RAD:
             break
     model, scatter = _covariances(total, information, score, frame, s)
     return s, a, blur, photometry, stats, noise, model, scatter, step
