@@ -1,13 +1,14 @@
 """The renderer that needs no OpenGL: exact outlines computed on the processor."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim_backend.lens import Lens
 from sim_backend.raster_floor import padded
-from sim_backend.raster_kernel import render_rows
+from sim_backend.raster_kernel import TILE, render_rows
 from sim_backend.raster_solids import CYLINDER, PACKED, SPHERE
 from sim_backend.scene import Cylinder, Scene, Sphere
 
@@ -29,6 +30,7 @@ class RasterRenderer:
         self._solids = np.array([_pack(solid) for solid in scene.solids])
         self._greys = padded(scene.floor.greys)
         self._floor_mean = np.float32(scene.floor.mean_grey)
+        self._helper = ThreadPoolExecutor(1, thread_name_prefix="raster")
         # Compiles the kernels now rather than in the middle of a run.
         self.render(np.eye(4)[None], (0, 1))
 
@@ -36,9 +38,19 @@ class RasterRenderer:
         """See ``Renderer.render``."""
         image = np.empty((rows[1] - rows[0], self._lens.width), np.float32)
         poses = np.ascontiguousarray(T_base_camera)
+        # Two threads, each with whole tiles: the same picture in less time on two processors.
+        half = (rows[1] - rows[0]) // (2 * TILE) * TILE
+        upper = self._helper.submit(self._fill, image[:half], rows[0], poses) if half else None
+        self._fill(image[half:], rows[0] + half, poses)
+        if upper is not None:
+            upper.result()
+        return image
+
+    def _fill(self, image: NDArray[np.float32], row0: int, poses: FloatArray) -> None:
+        """Render the rows from ``row0`` that ``image`` has room for."""
         render_rows(
             image,
-            rows[0],
+            row0,
             self._rays,
             self._lens.focal_px,
             poses,
@@ -50,10 +62,10 @@ class RasterRenderer:
             self._floor_mean,
             self._floor_poses(poses),
         )
-        return image
 
     def close(self) -> None:
-        """Nothing to release."""
+        """End the helping thread."""
+        self._helper.shutdown()
 
     def _floor_poses(self, poses: FloatArray) -> NDArray[np.int64]:
         """Which of the poses suffice for the floor, evenly spread."""

@@ -25,7 +25,7 @@ from sim_backend.raster_solids import (
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-_TILE = 16
+TILE = 16
 # Pixels this close to an outline are integrated: outside it the box filter's reach counts, inside
 # the steep shading of a limb too, which falls off as a square root.
 _OUTSIDE_PX, _INSIDE_PX = 0.75, 1.6
@@ -58,12 +58,12 @@ def render_rows(
     few_views = [views[i] for i in floor_poses]
     active = np.zeros(n, np.bool_)
     m, width = image.shape
-    for v0 in range(0, m, _TILE):
-        v1 = min(v0 + _TILE, m)
+    for v0 in range(0, m, TILE):
+        v1 = min(v0 + TILE, m)
         band = rays[:, row0 + v0 : row0 + v1]
         empty_from = 0  # tiles without solids are filled together: long rows are faster
-        for u0 in range(0, width, _TILE):
-            u1 = min(u0 + _TILE, width)
+        for u0 in range(0, width, TILE):
+            u1 = min(u0 + TILE, width)
             some = False
             for o in range(n):
                 reach = (margins[o] + _OUTSIDE_PX) / focal_px
@@ -178,7 +178,7 @@ def _fills(
             if focal_px * rough_distance(row, x, y) < _ROUGHLY * (_INSIDE_PX + margin_px):
                 return False
             # As if pixels were larger: the ends of a cylinder are further than a tile away.
-            if may_end(row, span, hit(row, x, y, span), 4.0 * focal_px / _TILE):
+            if may_end(row, span, hit(row, x, y, span), 4.0 * focal_px / TILE):
                 return False
     return True
 
