@@ -14,7 +14,7 @@ from estimator.image.limb_fit import LimbFit, refine_cylinder, refine_sphere
 # Edge points sit up to 0.3 px off on shaded and motion-blurred outlines, the refinement does not.
 _MOST_SHIFT_PX, _MOST_SHIFT_PER_EXPECTED = 0.2, 4.0
 _LEAST_USABLE, _MOST_CHI2 = 0.6, 4.0
-# Largest error seen of clean sides along the pixel grid, in 12 images.
+# Clean, refined cylinders with sides along the pixel grid were 0.003 to 0.009 px off (5 images).
 _GRID_PX = 0.01
 _CLEAR_SHARE, _CLEAR_SCATTER_PX, _SYSTEMATIC_PX = 0.93, 0.15, 0.08
 
