@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar, cast
 
 import numba
+from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -35,6 +36,14 @@ def jit_sums(function: F) -> F:
 def jit_inlined(function: F) -> F:
     """As `jit_sums`, for what a loop of `jit_sums` calls: only then it takes several at a time."""
     return _compiled(function, fastmath=_REORDERED, forceinline=True)
+
+
+def jit_template(function: F) -> F:
+    """For what kernels call but do not share: compiled, and cached, within each of them.
+
+    So a template can take functions, which `jit` could not cache. Called from Python it is Python.
+    """
+    return cast(F, register_jitable(function))
 
 
 def _compiled(function: F, fastmath: frozenset[str] = frozenset(), forceinline: bool = False) -> F:

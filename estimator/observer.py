@@ -70,6 +70,10 @@ class Observer:
         self._damping = damping
         self._radius_guess_m = radius_guess_m
         self._state: _State | None = None
+        # Compiles the model's kernels now rather than in the middle of a run.
+        still = np.zeros((2, 6))
+        s, _ = model.flow(np.zeros((1, model.m)), np.zeros((1, model.p)), np.arange(2.0), still)
+        model.structures(s[0], still)
 
     def correct(self, feature: Feature, t_s: float, motion: TwistHistory) -> Correction:
         """Move the state to ``t_s``, the exposure instant of the image ``feature`` came from.
@@ -114,7 +118,7 @@ class Observer:
         if now_s == state.t_s:
             return self._answer(now_s, state.s, state.chi, 0.0)
         window = motion.window(state.t_s, now_s)
-        nodes = refine(window.times_s, window.twists_camera)
+        nodes = window.times_s, window.twists_camera
         s, chi = integrate(self._model, state.s[None], state.chi[None], *nodes)
         return self._answer(now_s, s[0, -1], chi[0, -1], window.extrapolated_s)
 
@@ -181,12 +185,12 @@ def _explain(
     chi0 = state.chi + np.concatenate((np.zeros((1, p)), delta * np.eye(p)))
     s0 = np.repeat(state.s[None], p + 1, axis=0)
     s, chi = integrate(model, s0, chi0, times_s, twists)
-    B = np.moveaxis(s[1:] - s[0], 0, -1) / delta  # (n, m, p)
-    transition = np.moveaxis(chi[1:] - chi[0], 0, -1) / delta  # (n, p, p) from the start
+    B = (s[1:] - s[0]).transpose(1, 2, 0) / delta  # (n, m, p)
+    transition = (chi[1:] - chi[0]).transpose(1, 2, 0) / delta  # (n, p, p) from the start
 
     mismatch = s_end - s[0, -1]
     steps_s = np.diff(times_s)
-    Omega = model.Omega(s[0], twists[:, :3])
+    Omega = model.structures(s[0], twists)
     # |B|² can reach T ∫|Ω|² and falls short of it as the motion turns back on itself.
     reach = duration_s * float(steps_s @ (Omega[1:] ** 2).sum(axis=(1, 2)))
     guard = _RETURN_GUARD * reach / p + (REST_SIGMA * duration_s) ** 2
@@ -196,7 +200,7 @@ def _explain(
 
     elapsed = (times_s - times_s[0])[:, None]
     s_between = s[0] + (B @ z) + elapsed * unexplained
-    Omega = model.Omega(s_between, twists[:, :3])
+    Omega = model.structures(s_between, twists)
     return _Interval(
         steps_s=steps_s,
         Omega=0.5 * (Omega[1:] + Omega[:-1]),

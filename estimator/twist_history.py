@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimator.jit import jit, jit_template
+
 FloatArray = NDArray[np.float64]
 
 _FIRST_CAPACITY = 1024
@@ -49,6 +51,8 @@ class TwistHistory:
         self._twists = np.empty((_FIRST_CAPACITY, 6))
         self._first = 0
         self._end = 0
+        # Compiles the kernel now rather than in the middle of a run.
+        _cut(np.zeros(1), np.zeros((1, 6)), 0, 1, 0.0, 0.0)
 
     def __len__(self) -> int:
         return self._end - self._first
@@ -96,7 +100,8 @@ class TwistHistory:
 
     def at(self, t_s: float) -> TwistSample:
         """The twist at one instant; raises MotionUnknownError where it is not known."""
-        return TwistSample(t_s, self._interpolate(t_s), self._checked_outside_s(t_s))
+        outside_s = self._checked_outside_s(t_s)
+        return TwistSample(t_s, self._cut(t_s, t_s)[1][0], outside_s)
 
     def window(self, t0_s: float, t1_s: float) -> TwistWindow:
         """The twist over [t0_s, t1_s], end points included.
@@ -107,29 +112,10 @@ class TwistHistory:
         if not t0_s <= t1_s:
             raise ValueError(f"the interval [{t0_s:.6f}, {t1_s:.6f}] s runs backwards")
         outside_s = max(self._checked_outside_s(t0_s), self._checked_outside_s(t1_s))
-        if t0_s == t1_s:
-            return TwistWindow(np.array([t0_s]), self._interpolate(t0_s)[None], outside_s)
-        stamps = self._times_s[self._first : self._end]
-        inner = slice(
-            self._first + int(np.searchsorted(stamps, t0_s, side="right")),
-            self._first + int(np.searchsorted(stamps, t1_s, side="left")),
-        )
-        times = np.concatenate(([t0_s], self._times_s[inner], [t1_s]))
-        ends = self._interpolate(t0_s)[None], self._interpolate(t1_s)[None]
-        return TwistWindow(
-            times, np.concatenate((ends[0], self._twists[inner], ends[1])), outside_s
-        )
+        return TwistWindow(*self._cut(t0_s, t1_s), outside_s)
 
-    def _interpolate(self, t_s: float) -> FloatArray:
-        stamps = self._times_s[self._first : self._end]
-        after = self._first + int(np.searchsorted(stamps, t_s, side="left"))
-        # Before the first or after the last stamp both neighbours are the end sample.
-        earlier = max(after - 1, self._first)
-        later = min(after, self._end - 1)
-        t0, t1 = self._times_s[earlier], self._times_s[later]
-        share = (t_s - t0) / (t1 - t0) if earlier < later else 0.0
-        twist: FloatArray = (1.0 - share) * self._twists[earlier] + share * self._twists[later]
-        return twist
+    def _cut(self, t0_s: float, t1_s: float) -> tuple[FloatArray, FloatArray]:
+        return _cut(self._times_s, self._twists, self._first, self._end, float(t0_s), float(t1_s))
 
     def _outside_s(self, t_s: float) -> float:
         return max(self.start_s - t_s, t_s - self.end_s, 0.0)
@@ -167,3 +153,51 @@ class TwistHistory:
         stamps = self._times_s[self._first : self._end]
         older = int(np.searchsorted(stamps, self.end_s - self._span_s, side="right"))
         self._first += max(older - 1, 0)
+
+
+@jit
+def _cut(
+    times_s: FloatArray, twists: FloatArray, first: int, end: int, t0_s: float, t1_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Of the rows [first, end): both ends and every stamp strictly between; one row if t0 = t1."""
+    low, high = first, end
+    while low < high:  # ends at the first stamp later than t0
+        middle = (low + high) // 2
+        if times_s[middle] <= t0_s:
+            low = middle + 1
+        else:
+            high = middle
+    stop = low
+    while stop < end and times_s[stop] < t1_s:
+        stop += 1
+    n = stop - low + (2 if t1_s > t0_s else 1)
+    out_times_s, out = np.empty(n), np.empty((n, 6))
+    out_times_s[0] = t0_s
+    _interpolate(times_s, twists, first, end, low, t0_s, out[0])
+    for k in range(low, stop):
+        out_times_s[k - low + 1] = times_s[k]
+        out[k - low + 1] = twists[k]
+    if n > stop - low + 1:
+        out_times_s[n - 1] = t1_s
+        _interpolate(times_s, twists, first, end, stop, t1_s, out[n - 1])
+    return out_times_s, out
+
+
+@jit_template
+def _interpolate(
+    times_s: FloatArray,
+    twists: FloatArray,
+    first: int,
+    end: int,
+    after: int,
+    t_s: float,
+    out: FloatArray,
+) -> None:
+    """The twist (6,) at ``t_s`` into ``out``; ``after`` is the row that follows it, or ``end``."""
+    # Before the first or after the last stamp both neighbours are the end sample.
+    earlier, later = max(after - 1, first), min(after, end - 1)
+    share = 0.0
+    if earlier < later:
+        share = (t_s - times_s[earlier]) / (times_s[later] - times_s[earlier])
+    for j in range(6):
+        out[j] = (1.0 - share) * twists[earlier, j] + share * twists[later, j]

@@ -6,8 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimator.active.sigma2 import J_a, J_v, useful_velocity
-from estimator.cross import cross
+from estimator.jit import jit, jit_template
 
 FloatArray = NDArray[np.float64]
 
@@ -64,8 +63,10 @@ class PaperPolicy:
         if not (k1 >= 0.0 and k2 >= 0.0 and math.isfinite(k1 + k2)):
             raise ValueError(f"the gains of (24) must not be negative: k1 = {k1}, k2 = {k2}")
         self._kappa_des = 0.5 * float(self._v @ self._v)
-        self._k1 = k1
-        self._k2 = k2
+        self._k1 = float(k1)
+        self._k2 = float(k2)
+        # Compiles the kernel now rather than in the middle of a run; no time, no change.
+        self.advance(None, np.zeros(3), 0.0)
 
     @property
     def v(self) -> FloatArray:
@@ -74,53 +75,106 @@ class PaperPolicy:
 
     def advance(self, axis: FloatArray | None, omega: FloatArray, dt_s: float) -> None:
         """Integrate (24) over ``dt_s`` for the axis and the ω of now."""
-        fastest = max(self._k1, 2.0 * self._k2, float(np.linalg.norm(omega)))
+        fastest = max(self._k1, 2.0 * self._k2, math.hypot(*omega))
         steps = max(1, math.ceil(dt_s * fastest / _MAX_GAIN_STEP))
-        h = dt_s / steps
-        for _ in range(steps):
-            r1 = self.v_dot(self._v, axis, omega)
-            r2 = self.v_dot(self._v + 0.5 * h * r1, axis, omega)
-            r3 = self.v_dot(self._v + 0.5 * h * r2, axis, omega)
-            r4 = self.v_dot(self._v + h * r3, axis, omega)
-            self._v = self._v + (h / 6.0) * (r1 + 2.0 * r2 + 2.0 * r3 + r4)
+        self._v = _advanced(self._v, _known(axis), omega, self._gains(axis), dt_s / steps, steps)
 
     def v_dot(self, v: FloatArray, axis: FloatArray | None, omega: FloatArray) -> FloatArray:
         """v̇ (3,) of (24) at v, in m/s²."""
-        square = float(v @ v)
-        along = self._k1 * (self._kappa_des - 0.5 * square) / square
-        if axis is None or self._k2 == 0.0:
-            return along * v
-        ascent = _gradient(v, axis) - _compensation(v, axis, omega)
-        across = ascent - v * (float(v @ ascent) / square)
-        return along * v + self._k2 * across
+        return _v_dot(v, _known(axis), omega, self._gains(axis))
+
+    def _gains(self, axis: FloatArray | None) -> tuple[float, float, float]:
+        """κ_des, k1 and k2; on a sphere there is nothing to climb."""
+        return self._kappa_des, self._k1, 0.0 if axis is None else self._k2
 
 
+def _known(axis: FloatArray | None) -> FloatArray:
+    return np.zeros(3) if axis is None else axis
+
+
+@jit
+def _advanced(
+    v: FloatArray,
+    axis: FloatArray,
+    omega: FloatArray,
+    gains: tuple[float, float, float],
+    h: float,
+    steps: int,
+) -> FloatArray:
+    """v after steps of ``h`` seconds by Runge and Kutta's rule."""
+    for _ in range(steps):
+        r1 = _v_dot(v, axis, omega, gains)
+        r2 = _v_dot(_sum(v, 0.5 * h, r1), axis, omega, gains)
+        r3 = _v_dot(_sum(v, 0.5 * h, r2), axis, omega, gains)
+        r4 = _v_dot(_sum(v, h, r3), axis, omega, gains)
+        v = _sum(v, h / 6.0, _sum(_sum(r1, 2.0, r2), 1.0, _sum(r4, 2.0, r3)))
+    return v
+
+
+@jit_template
+def _v_dot(
+    v: FloatArray, axis: FloatArray, omega: FloatArray, gains: tuple[float, float, float]
+) -> FloatArray:
+    kappa_des, k1, k2 = gains
+    square = _dot(v, v)
+    along = _sum(np.zeros(3), k1 * (kappa_des - 0.5 * square) / square, v)
+    if k2 == 0.0:
+        return along
+    ascent = _sum(_gradient(v, axis), -1.0, _compensation(v, axis, omega))
+    across = _sum(ascent, -_dot(v, ascent) / square, v)
+    return _sum(along, k2, across)
+
+
+@jit_template
 def _gradient(v: FloatArray, axis: FloatArray) -> FloatArray:
     """J_vᵀ, or the push out of v ∥ a in its place."""
-    useful = useful_velocity(v, axis)
-    speed = float(np.linalg.norm(v))
-    share = float(np.linalg.norm(useful)) / speed
+    useful = _sum(v, -_dot(axis, v), axis)
+    speed = math.sqrt(_dot(v, v))
+    share = math.sqrt(_dot(useful, useful)) / speed
+    gradient = _sum(useful, 1.0, useful)
     if share >= _ESCAPE_SHARE:
-        return J_v(v, axis)
+        return gradient
     # Blends into J_vᵀ at the edge of the region, so v̇ stays continuous.
-    push = 2.0 * (_ESCAPE_SHARE - share) * speed
-    return J_v(v, axis) + push * _sideways(axis)
+    return _sum(gradient, 2.0 * (_ESCAPE_SHARE - share) * speed, _sideways(axis))
 
 
+@jit_template
 def _compensation(v: FloatArray, axis: FloatArray, omega: FloatArray) -> FloatArray:
     """J_v† J_a [a]× ω, bounded by |aᵀv| ‖ω‖, and faded out where J_v† has no direction."""
-    gradient = J_v(v, axis)
-    norm = float(np.linalg.norm(gradient))
-    edge = 2.0 * _ESCAPE_SHARE * float(np.linalg.norm(v))
-    inverse = gradient / max(norm, edge) ** 2
-    return inverse * float(J_a(v, axis) @ cross(axis, omega))
+    along = _dot(v, axis)
+    useful = _sum(v, -along, axis)
+    gradient = _sum(useful, 1.0, useful)
+    edge = 2.0 * _ESCAPE_SHARE * math.sqrt(_dot(v, v))
+    norm = max(math.sqrt(_dot(gradient, gradient)), edge)
+    turning = np.array(
+        [
+            axis[1] * omega[2] - axis[2] * omega[1],
+            axis[2] * omega[0] - axis[0] * omega[2],
+            axis[0] * omega[1] - axis[1] * omega[0],
+        ]
+    )
+    J_a_turning = -2.0 * along * _dot(v, turning)
+    return _sum(np.zeros(3), J_a_turning / (norm * norm), gradient)
 
 
+@jit_template
 def _sideways(axis: FloatArray) -> FloatArray:
     """The unit vector across ``axis`` within the image plane; along x for a ∥ z."""
-    across = np.array([-axis[1], axis[0], 0.0])
-    norm = float(np.linalg.norm(across))
-    return across / norm if norm > 1e-6 else np.array([1.0, 0.0, 0.0])
+    norm = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1])
+    if norm > 1e-6:
+        return np.array([-axis[1] / norm, axis[0] / norm, 0.0])
+    return np.array([1.0, 0.0, 0.0])
+
+
+@jit_template
+def _dot(a: FloatArray, b: FloatArray) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@jit_template
+def _sum(a: FloatArray, factor: float, b: FloatArray) -> FloatArray:
+    """a + factor · b (3,)."""
+    return np.array([a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]])
 
 
 def _velocity(v: ArrayLike) -> FloatArray:

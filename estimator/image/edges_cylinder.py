@@ -27,7 +27,10 @@ def line_residual(ray: FloatArray, kappa: float, n: FloatArray) -> float:
 
 
 @jit
-def _score(rays: FloatArray, strengths: FloatArray, normals: FloatArray, n: FloatArray) -> float:
+def _score(
+    rays: FloatArray, strengths: FloatArray, normals: FloatArray, n: FloatArray, to_beat: float
+) -> float:
+    """How well the normals agree on n; less than that once ``to_beat`` is out of reach."""
     total = 0.0
     for i in range(rays.shape[0]):
         best = 0.0
@@ -39,6 +42,8 @@ def _score(rays: FloatArray, strengths: FloatArray, normals: FloatArray, n: Floa
             if abs(r) < 1.0:
                 best = max(best, (1.0 - r * r) * g / (g + _SOFT_GREY))
         total += best
+        if total + (rays.shape[0] - 1 - i) < to_beat:  # no normal counts for more than 1
+            break
     return total
 
 
@@ -80,14 +85,14 @@ def consensus_line(
     """The unit n (3,) on which most normals agree, and its score (at most their number)."""
     count = rays.shape[0]
     best = n0.copy()
-    score_best = _score(rays, strengths, normals, best)
+    score_best = _score(rays, strengths, normals, best, 0.0)
     state = np.uint64(seed * 2 + 1)
     for _ in range(_TRIALS):
         state = state * LCG_FACTOR + LCG_STEP
         n, usable = _trial(rays, strengths, n0, int(state >> np.uint64(30)))
         if not usable:
             continue
-        score = _score(rays, strengths, normals, n)
+        score = _score(rays, strengths, normals, n, score_best)
         if score > score_best:
             score_best = score
             best = n
@@ -170,25 +175,28 @@ def fit_line(
     return n, inverse, residuals, scale, True
 
 
+@jit
 def cylinder_of_lines(n1: FloatArray, n2: FloatArray) -> tuple[FloatArray, FloatArray]:
     """s (3,) and unit axis a (3,) from the two unit normals towards the axis; eqs. (15)-(18)."""
     delta = 0.5 * (n1 + n2)
     a = np.cross(n2, n1)
-    return delta / float(delta @ delta), a / float(np.linalg.norm(a))
+    return delta / np.sum(delta * delta), a / np.sqrt(np.sum(a * a))
 
 
+@jit
 def lines_of_cylinder(s: FloatArray, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The unit normals n1, n2 (3,) of a cylinder's tangent planes; eq. (15) divided by R^2."""
-    ss = float(s @ s)
+    ss = np.sum(s * s)
     b = np.sqrt(max(ss - 1.0, 0.0)) * np.cross(s, axis)
     return (s - b) / ss, (s + b) / ss
 
 
+@jit
 def cylinder_covariance(
     n1: FloatArray, n2: FloatArray, covariance_1: FloatArray, covariance_2: FloatArray
 ) -> FloatArray:
     """Covariance (3, 3) of s from those of the two independent normals; derivative of (16)."""
     delta = 0.5 * (n1 + n2)
-    dd = float(delta @ delta)
+    dd = np.sum(delta * delta)
     jacobian = 0.5 * (np.eye(3) / dd - 2.0 * np.outer(delta, delta) / dd**2)
     return jacobian @ (covariance_1 + covariance_2) @ jacobian.T

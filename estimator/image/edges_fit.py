@@ -12,13 +12,8 @@ from estimator.image.edges_cylinder import (
     fit_line,
     lines_of_cylinder,
 )
-from estimator.image.edges_profile import (
-    BoolArray,
-    edge_peaks,
-    expected_noise_px,
-    peak_rays,
-    stands_out_deep,
-)
+from estimator.image.edges_profile import BoolArray, edge_peaks, peak_rays
+from estimator.image.edges_signs import appearance
 from estimator.image.edges_sphere import consensus_cone, fit_cone, s_of_cone
 from estimator.image.intrinsics import FloatArray
 from estimator.image.outline_normals import line_normals, sphere_normals
@@ -27,7 +22,6 @@ REACH_PX = 15  # of the first search along the normals
 _FINE_REACH_PX = 6
 _GATE_PX = 3.0
 _LEAST_GREY = 4.0
-_DEPTH_PX = 10.0
 SPHERE_NORMALS = 120
 LINE_NORMALS = 72
 
@@ -39,8 +33,10 @@ class OutlineEdges:
     normals: FloatArray  # (n, 5): u, v, nu, nv, kappa; see outline_normals
     residuals_px: FloatArray  # (n,) outwards; NaN where there is no edge
     scale_px: float  # robust standard deviation of the residuals
-    expected_px: FloatArray  # (n,) the deviations that the surroundings make one expect
-    deep: BoolArray  # (n,) whether the target's inside stands out too, not only its rim
+    agreeing: BoolArray  # (n,) whether there is an edge where the outline says
+    agreeing_share: float
+    expected_px: float  # the deviations that the surroundings make one expect
+    deep_share: float  # where the target's inside stands out too, not only its rim
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +120,5 @@ def _fit_side(
 def _seen(
     image: GreyImage, normals: FloatArray, residuals: FloatArray, scale: float, sign: float
 ) -> OutlineEdges:
-    expected = expected_noise_px(image, normals, sign)
-    deep = stands_out_deep(image, normals, sign, _DEPTH_PX)
-    return OutlineEdges(normals, residuals, scale, expected, deep)
+    agreeing, share, expected_px, deep = appearance(image, normals, residuals, scale, sign)
+    return OutlineEdges(normals, residuals, scale, agreeing, share, expected_px, deep)

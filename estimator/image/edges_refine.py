@@ -4,12 +4,12 @@ import numpy as np
 
 from estimator.image.edges_camera import GreyImage
 from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
-from estimator.image.edges_fit import EdgeFit, OutlineEdges
-from estimator.image.edges_profile import MAX_PEAKS, peak_rays
-from estimator.image.edges_trust import agreeing_edges
+from estimator.image.edges_fit import EdgeFit
+from estimator.image.edges_signs import cone_shift_px, line_shift_px
 from estimator.image.feature import Feature, Measurement
 from estimator.image.intrinsics import FloatArray, Intrinsics
 from estimator.image.limb_fit import LimbFit, refine_cylinder, refine_sphere
+from estimator.jit import jit
 
 # Edge points sit up to 0.3 px off on shaded and motion-blurred outlines, the refinement does not.
 _MOST_SHIFT_PX, _MOST_SHIFT_PER_EXPECTED = 0.2, 4.0
@@ -20,26 +20,46 @@ _CLEAR_SHARE, _CLEAR_SCATTER_PX, _SYSTEMATIC_PX = 0.93, 0.15, 0.08
 
 
 def refined(
-    image: GreyImage, intrinsics: Intrinsics, camera: FloatArray, fit: EdgeFit
-) -> Measurement:
-    """The feature of a certified edge fit, refined, or why the refinement is not to be trusted."""
-    if fit.axis is None:
-        limb = refine_sphere(image, intrinsics, fit.s)
-    else:
-        limb = refine_cylinder(image, intrinsics, fit.s, fit.axis)
+    image: GreyImage, intrinsics: Intrinsics, camera: FloatArray, fit: EdgeFit,
+    learnt: FloatArray | None = None,
+) -> tuple[Measurement, FloatArray | None]:  # fmt: skip
+    """The feature of a certified edge fit, refined, or why the refinement is not to be trusted.
+
+    ``learnt`` is what the image before taught of blur and noise (`LimbFit.learnt`) or None; with
+    the result comes what this one did.
+    """
+    limb = _limb(image, intrinsics, fit, learnt)
     doubt = _limb_doubt(limb, camera, fit)
+    if doubt and learnt is not None:
+        limb = _limb(image, intrinsics, fit, None)
+        doubt = _limb_doubt(limb, camera, fit)
     clear = all(
-        np.mean(agreeing_edges(edges)) >= _CLEAR_SHARE and edges.scale_px <= _CLEAR_SCATTER_PX
+        edges.agreeing_share >= _CLEAR_SHARE and edges.scale_px <= _CLEAR_SCATTER_PX
         for edges in fit.outlines
     )
     if limb is not None and not doubt and (limb.converged or not clear):
-        covariance = limb.covariance + _grid_covariance(fit, limb, intrinsics.fx_px)
-        return Measurement(Feature(limb.s, covariance, limb.axis))
+        covariance = limb.covariance
+        if limb.axis is not None:
+            one, other = (edges.normals for edges in fit.outlines)
+            covariance = covariance + _grid_covariance(
+                limb.s, limb.axis, one, other, intrinsics.fx_px
+            )
+        feature = Feature(limb.s, covariance, limb.axis)
+        return Measurement(feature), limb.learnt if limb.converged else None
     # Sides along the pixel grid can leave the refinement without a solution; edges that are all
     # there and agree closely still measure, less precisely.
     if clear:
-        return Measurement(Feature(fit.s, _edge_covariance(fit, intrinsics.fx_px), fit.axis))
-    return Measurement(None, doubt)
+        covariance = _edge_covariance(fit, intrinsics.fx_px)
+        return Measurement(Feature(fit.s, covariance, fit.axis)), None
+    return Measurement(None, doubt), None
+
+
+def _limb(
+    image: GreyImage, intrinsics: Intrinsics, fit: EdgeFit, learnt: FloatArray | None
+) -> LimbFit | None:
+    if fit.axis is None:
+        return refine_sphere(image, intrinsics, fit.s, learnt)
+    return refine_cylinder(image, intrinsics, fit.s, fit.axis, learnt)
 
 
 def _limb_doubt(limb: LimbFit | None, camera: FloatArray, fit: EdgeFit) -> str:
@@ -50,30 +70,36 @@ def _limb_doubt(limb: LimbFit | None, camera: FloatArray, fit: EdgeFit) -> str:
         return f"only {limb.usable_fraction:.0%} of the outline's pixels fit a target's edge"
     if limb.chi2 > _MOST_CHI2:
         return "the outline's pixels depart from a target's edge"
-    for side, edges in enumerate(fit.outlines):
-        expected_px = float(np.mean(edges.expected_px))
-        most_px = _MOST_SHIFT_PX + _MOST_SHIFT_PER_EXPECTED * expected_px
-        if not _shift_px(edges, camera, limb, side) <= most_px:
+    if limb.axis is None:
+        shifts = [cone_shift_px(camera, fit.outlines[0].normals, limb.s)]
+    else:
+        lines = lines_of_cylinder(limb.s, limb.axis)
+        sides = zip(fit.outlines, lines, strict=True)
+        shifts = [line_shift_px(camera, edges.normals, n) for edges, n in sides]
+    for edges, shift_px in zip(fit.outlines, shifts, strict=True):
+        if not shift_px <= _MOST_SHIFT_PX + _MOST_SHIFT_PER_EXPECTED * edges.expected_px:
             return "the outline's edges and pixels disagree on where it is"
     return ""
 
 
-def _grid_covariance(fit: EdgeFit, limb: LimbFit, focal_px: float) -> FloatArray:
-    """What is added (3, 3) where a side runs along the pixel grid.
+@jit
+def _grid_covariance(
+    s: FloatArray, axis: FloatArray, one: FloatArray, other: FloatArray, focal_px: float
+) -> FloatArray:
+    """What is added (3, 3) where a side, of normals ``one`` or ``other``, is along the pixel grid.
 
     There one column of pixels shows the whole edge at one phase, and what the profile is off at
     that phase does not average out, as it does once the side crosses a few columns.
     """
-    if limb.axis is None:
-        return np.zeros((3, 3))
-    normals = lines_of_cylinder(limb.s, limb.axis)
-    spread = []
-    for n, edges in zip(normals, fit.outlines, strict=True):
-        crossed_px = float(np.ptp(edges.normals[:, :2], axis=0).min())
-        angle = _GRID_PX / (1.0 + crossed_px**2) / focal_px
-        across = np.cross(limb.axis, n)
-        spread.append(angle**2 * np.outer(across, across))
-    return cylinder_covariance(normals[0], normals[1], spread[0], spread[1])
+    n1, n2 = lines_of_cylinder(s, axis)
+    spread = np.empty((2, 3, 3))
+    for side in range(2):
+        n, normals = (n1, one) if side == 0 else (n2, other)
+        wide, high = np.ptp(normals[:, 0]), np.ptp(normals[:, 1])
+        angle = _GRID_PX / (1.0 + min(wide, high) ** 2) / focal_px
+        across = np.cross(axis, n)
+        spread[side] = angle**2 * np.outer(across, across)
+    return cylinder_covariance(n1, n2, spread[0], spread[1])
 
 
 def _edge_covariance(fit: EdgeFit, focal_px: float) -> FloatArray:
@@ -91,17 +117,3 @@ def _edge_covariance(fit: EdgeFit, focal_px: float) -> FloatArray:
         + (angle * norm) ** 2 * (norm**2 - 1.0) * towards
         + (angle * norm) ** 2 * (np.eye(3) - towards)
     )
-
-
-def _shift_px(edges: OutlineEdges, camera: FloatArray, limb: LimbFit, side: int) -> float:
-    """How far the refined outline lies from the edges' one, at most."""
-    none = np.zeros((len(edges.normals), MAX_PEAKS))
-    one = none.copy()
-    one[:, 0] = 1.0
-    rays = peak_rays(camera, edges.normals, none, one)[:, 0]
-    if limb.axis is None:
-        q = np.sqrt(float(limb.s @ limb.s) - 1.0)
-        shifts = (1.0 - rays @ limb.s / q) / (1.0 / q)
-    else:
-        shifts = rays @ lines_of_cylinder(limb.s, limb.axis)[side]
-    return float(np.max(np.abs(edges.normals[:, 4] * shifts)))

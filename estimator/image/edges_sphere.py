@@ -47,7 +47,10 @@ def cone_residual(ray: FloatArray, kappa: float, w: FloatArray, q: float) -> flo
 
 
 @jit
-def _score(rays: FloatArray, strengths: FloatArray, normals: FloatArray, w: FloatArray) -> float:
+def _score(
+    rays: FloatArray, strengths: FloatArray, normals: FloatArray, w: FloatArray, to_beat: float
+) -> float:
+    """How well the normals agree on w; less than that once ``to_beat`` is out of reach."""
     q = np.sqrt(max(w[0] ** 2 + w[1] ** 2 + w[2] ** 2 - 1.0, 1e-12))
     total = 0.0
     for i in range(rays.shape[0]):
@@ -60,6 +63,8 @@ def _score(rays: FloatArray, strengths: FloatArray, normals: FloatArray, w: Floa
             if abs(r) < 1.0:
                 best = max(best, (1.0 - r * r) * g / (g + _SOFT_GREY))
         total += best
+        if total + (rays.shape[0] - 1 - i) < to_beat:  # no normal counts for more than 1
+            break
     return total
 
 
@@ -101,13 +106,13 @@ def consensus_cone(
     """
     count = rays.shape[0]
     w_best = s0 / np.sqrt(s0[0] ** 2 + s0[1] ** 2 + s0[2] ** 2 - 1.0)
-    score_best = _score(rays, strengths, normals, w_best)
+    score_best = _score(rays, strengths, normals, w_best, 0.0)
     state = np.uint64(seed * 2 + 1)
     for _ in range(_TRIALS):
         state, w, usable = _trial(rays, strengths, state)
         if not usable:
             continue
-        score = _score(rays, strengths, normals, w)
+        score = _score(rays, strengths, normals, w, score_best)
         if score > score_best:
             score_best = score
             w_best = w
@@ -190,8 +195,9 @@ def fit_cone(
     return w, inverse, residuals, scale, True
 
 
+@jit
 def s_of_cone(w: FloatArray, covariance_w: FloatArray) -> tuple[FloatArray, FloatArray]:
     """s (3,) and its covariance (3, 3) from w = s / sqrt(|s|^2 - 1)."""
-    q = float(np.sqrt(w @ w - 1.0))
+    q = np.sqrt(np.sum(w * w) - 1.0)
     jacobian = np.eye(3) / q - np.outer(w, w) / q**3
     return w / q, jacobian @ covariance_w @ jacobian.T

@@ -9,12 +9,13 @@ from estimator.jit import jit_sums
 PHOTOMETRY = 7
 BLUR = 6
 # All rows lie in one flat array, MOST_PIXELS apart: with constant distances the compiler sees that
-# they are apart, and works on several pixels at once. First what the model makes of each pixel:
-# the photometry's basis, derivatives by geometry (up to 4), blur and a plain shift, grey, residual.
-MOST_PIXELS = 512  # across the outline in one sector
+# they are apart, and works on several pixels at once. (Not 512 apart: rows 4096 bytes apart push
+# each other out of the processor's cache.) First what the model makes of each pixel: the
+# photometry's basis, derivatives by geometry (up to 4), blur and a plain shift, grey, residual.
+MOST_PIXELS = 352  # across the outline in one sector
 R_GEOMETRY, R_BLUR, R_SHIFT, R_GREY, R_RESIDUAL, MODEL_ROWS = 7, 11, 17, 18, 19, 20
-# Then its weight, space for weighting a row, and what the model is told.
-WEIGHT, WEIGHTED, E_TAU, E_D, E_NU, E_NV, E_BEND, E_GEOMETRY, ALL_ROWS = *range(20, 28), 31
+# Then its weight, space for weighting two rows, and what the model is told.
+WEIGHT, WEIGHTED, E_TAU, E_D, E_NU, E_NV, E_BEND, E_GEOMETRY, ALL_ROWS = 20, 21, *range(23, 29), 32
 # Motion narrower than this is differentiated as if it were this wide: nearer to zero the
 # derivative is a spike between the pixels.
 _SMOOTH_WIDTH_PX = 0.7

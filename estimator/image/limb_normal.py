@@ -35,35 +35,34 @@ from estimator.image.limb_edge import (
     edge_rows,
 )
 from estimator.image.limb_linear import inverse_diagonal, reduce_normal
-from estimator.image.limb_pixels import BEND, DISTANCE, GEOMETRY, GREY, NU, NV, TAU
-from estimator.jit import jit_sums
+from estimator.image.limb_pixels import BEND, DISTANCE, GEOMETRY, GREY, HERE, NU, NV, TAU
+from estimator.jit import jit_inlined, jit_sums
 
 # Columns of the sector statistics.
 N_OUT, SS_OUT, N_IN, SS_IN, N_EDGE, CHI_EDGE, SHIFT, SHIFT_INFO, STATS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-_VECTOR = 32
+_VECTOR = 8
 
 
 @jit_sums
 def accumulate(
-    pixels: FloatArray, starts: NDArray[np.int64], stride: int, moved_by: FloatArray,
-    blur: FloatArray, turn_rad: float, photometry: FloatArray, noise: FloatArray,
+    pixels: FloatArray, starts: NDArray[np.int64], moved_by: FloatArray, blur: FloatArray,
+    turn_rad: float, photometry: FloatArray, noise: FloatArray,
     ridge: FloatArray, heavy_tail: float, margin_px: float, information: FloatArray,
-    score: FloatArray, back: FloatArray, spread: FloatArray, stats: FloatArray,
+    score: FloatArray, back: FloatArray, spread: FloatArray, stats: FloatArray, work: FloatArray,
 ) -> None:  # fmt: skip
     """Fill each sector's reduced information, score, photometry back-substitution and statistics.
 
-    Only every ``stride``-th pixel is used; ``moved_by`` (geometry,) is how far the geometry is from
-    that at which the pixels were located, ``margin_px`` bounds the outline's error. ``noise``
-    (sectors, 2): variances of reading and of the background. ``information`` (sectors,
-    n, n), ``score`` (sectors, n) with n geometry and blur parameters; ``back`` (sectors,
-    PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step; ``spread`` (sectors, PHOTOMETRY):
-    variances of p. ``heavy_tail``: the degrees of freedom of the residuals, 0 when p is unknown.
+    ``moved_by`` (geometry,) is how far the geometry is from that at which the pixels were located,
+    ``margin_px`` bounds the outline's error. ``noise`` (sectors, 2): variances of reading and of
+    the background. ``information`` (sectors, n, n), ``score`` (sectors, n) with n geometry and blur
+    parameters; ``back`` (sectors, PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step;
+    ``spread`` (sectors, PHOTOMETRY): variances of p. ``heavy_tail``: the degrees of freedom of the
+    residuals, 0 when p is unknown. ``work`` (3, ALL_ROWS * MOST_PIXELS) holds no NaN.
     """
     n = score.shape[1]
     geometry = n - BLUR
     width = n + 1  # the last column is a plain shift of the outline, for the sector's own verdict
-    rows = np.zeros(ALL_ROWS * MOST_PIXELS)
-    outside, inside = rows.copy(), rows.copy()
+    rows, outside, inside = work[0], work[1], work[2]
     gram = np.empty((MODEL_ROWS, MODEL_ROWS))
     at = np.empty(width, dtype=np.int64)  # the rows of the shared parameters
     for j in range(width):
@@ -86,7 +85,7 @@ def accumulate(
         p, noise_k, stats_k = photometry[k], noise[k], stats[k]
         along[0] = (k % max(per_line, 1) + 0.5) * along[1] - 1.0
         n_edge, n_out, n_in = _parted(
-            pixels, starts[k], starts[k + 1], stride, moved_by, reach, rows, outside, inside
+            pixels, starts[k], starts[k + 1], moved_by, reach, rows, outside, inside
         )
         stats_k[N_EDGE], stats_k[CHI_EDGE] = edge_rows(
             rows, n_edge, along, blur, turn, p, noise_k, heavy_tail, geometry
@@ -111,42 +110,63 @@ def accumulate(
         _gram(inside, n_in, 5, gram)
         _add_side(gram, 3, 4, gpp, rhs)
         reduce_normal(gpp, rhs, gtt, p, fit)
-        if stride == 1:
-            inverse_diagonal(gpp, spread[k])
+        inverse_diagonal(gpp, spread[k])
         _store(gtt, fit, information[k], score[k], back[k], stats_k)
 
 
 @jit_sums
 def _parted(
-    pixels: FloatArray, start: int, stop: int, stride: int, moved_by: FloatArray, reach: float,
+    pixels: FloatArray, start: int, stop: int, moved_by: FloatArray, reach: float,
     edge: FloatArray, outside: FloatArray, inside: FloatArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Sort a sector's pixels into those across the outline, outside and inside; their numbers."""
-    n_edge = n_out = n_in = 0
-    for i in range(start, stop, stride):
-        d = pixels[DISTANCE, i]
-        for j in range(moved_by.shape[0]):
-            d += moved_by[j] * pixels[GEOMETRY + j, i]
-        tau, grey = pixels[TAU, i], pixels[GREY, i]
-        if d < -reach and n_out < MOST_PIXELS:
-            outside[n_out], outside[MOST_PIXELS + n_out] = 1.0, tau
-            outside[2 * MOST_PIXELS + n_out], outside[3 * MOST_PIXELS + n_out] = d, grey
-            n_out += 1
-        elif d > reach and n_in < MOST_PIXELS:
-            inside[n_in], inside[MOST_PIXELS + n_in] = 1.0, tau
-            inside[2 * MOST_PIXELS + n_in], inside[3 * MOST_PIXELS + n_in] = d, np.sqrt(d)
-            inside[4 * MOST_PIXELS + n_in] = grey
-            n_in += 1
-        elif abs(d) <= reach and n_edge < MOST_PIXELS:
-            edge[E_TAU * MOST_PIXELS + n_edge], edge[R_GREY * MOST_PIXELS + n_edge] = tau, grey
-            edge[E_D * MOST_PIXELS + n_edge] = d
-            edge[E_NU * MOST_PIXELS + n_edge] = pixels[NU, i]
-            edge[E_NV * MOST_PIXELS + n_edge] = pixels[NV, i]
-            edge[E_BEND * MOST_PIXELS + n_edge] = pixels[BEND, i]
-            for j in range(moved_by.shape[0]):
-                edge[(E_GEOMETRY + j) * MOST_PIXELS + n_edge] = pixels[GEOMETRY + j, i]
-            n_edge += 1
+    """Copy a sector's pixels to those across the outline, outside and inside; their numbers.
+
+    A sector's pixels come (almost) from the outside inwards; between the first and the last one
+    within ``reach`` of the outline, all count as across it.
+    """
+    _copied(pixels, DISTANCE, start, stop - start, pixels[HERE, start:stop], 0)
+    distances = pixels[HERE, start:stop]
+    for j in range(moved_by.shape[0]):
+        by, change = moved_by[j], pixels[GEOMETRY + j, start:stop]
+        for i in range(distances.shape[0]):
+            distances[i] += by * change[i]
+    first, last = 0, distances.shape[0]
+    while first < last and distances[first] < -reach:
+        first += 1
+    while last > first and distances[last - 1] > reach:
+        last -= 1
+    n_out, n_in = min(first, MOST_PIXELS), min(distances.shape[0] - last, MOST_PIXELS)
+    n_edge = min(last - first, MOST_PIXELS)
+    _copied(pixels, TAU, start, n_out, outside, MOST_PIXELS)
+    _copied(pixels, HERE, start, n_out, outside, 2 * MOST_PIXELS)
+    _copied(pixels, GREY, start, n_out, outside, 3 * MOST_PIXELS)
+    _copied(pixels, TAU, start + last, n_in, inside, MOST_PIXELS)
+    _copied(pixels, HERE, start + last, n_in, inside, 2 * MOST_PIXELS)
+    _copied(pixels, GREY, start + last, n_in, inside, 4 * MOST_PIXELS)
+    for i in range(n_out):
+        outside[i] = 1.0
+    for i in range(n_in):
+        inside[i] = 1.0
+        inside[3 * MOST_PIXELS + i] = np.sqrt(inside[2 * MOST_PIXELS + i])
+    for j in range(moved_by.shape[0]):
+        _copied(pixels, GEOMETRY + j, start + first, n_edge, edge, (E_GEOMETRY + j) * MOST_PIXELS)
+    _copied(pixels, TAU, start + first, n_edge, edge, E_TAU * MOST_PIXELS)
+    _copied(pixels, GREY, start + first, n_edge, edge, R_GREY * MOST_PIXELS)
+    _copied(pixels, HERE, start + first, n_edge, edge, E_D * MOST_PIXELS)
+    _copied(pixels, NU, start + first, n_edge, edge, E_NU * MOST_PIXELS)
+    _copied(pixels, NV, start + first, n_edge, edge, E_NV * MOST_PIXELS)
+    _copied(pixels, BEND, start + first, n_edge, edge, E_BEND * MOST_PIXELS)
     return n_edge, n_out, n_in
+
+
+@jit_inlined
+def _copied(
+    pixels: FloatArray, row: int, begin: int, count: int, to: FloatArray, place: int
+) -> None:  # fmt: skip
+    """Copy ``count`` pixels of one row from ``begin`` on to ``place``."""
+    source, target = pixels[row, begin : begin + count], to[place : place + count]
+    for i in range(count):
+        target[i] = source[i]
 
 
 @jit_sums
@@ -168,22 +188,33 @@ def _weights(
 
 
 @jit_sums
-def _gram(rows: FloatArray, count: int, used: int, out: FloatArray) -> None:
-    """Weighted scalar products of the first ``used`` rows into the lower triangle of ``out``."""
+def _gram(flat: FloatArray, count: int, used: int, out: FloatArray) -> None:
+    """Weighted scalar products of the first ``used`` rows into the lower triangle of ``out``.
+
+    Two rows by two at a time, which loads each number half as often.
+    """
+    rows = flat.reshape((ALL_ROWS, MOST_PIXELS))
     # Up to whole vectors of the processor, with pixels of no weight.
     padded = min((count + _VECTOR - 1) // _VECTOR * _VECTOR, MOST_PIXELS)
     for i in range(count, padded):
-        rows[WEIGHT * MOST_PIXELS + i] = 0.0
-    for j in range(used):
+        rows[WEIGHT, i] = 0.0
+    for half_j in range((used + 1) // 2):
+        j = 2 * half_j
         for i in range(padded):
-            rows[WEIGHTED * MOST_PIXELS + i] = (
-                rows[WEIGHT * MOST_PIXELS + i] * rows[j * MOST_PIXELS + i]
-            )
-        for m in range(j + 1):
-            total = 0.0
+            weight = rows[WEIGHT, i]
+            rows[WEIGHTED, i] = weight * rows[j, i]
+            rows[WEIGHTED + 1, i] = weight * rows[j + 1, i]
+        for half_m in range(half_j + 1):
+            m = 2 * half_m
+            t00 = t01 = t10 = t11 = 0.0
             for i in range(padded):
-                total += rows[WEIGHTED * MOST_PIXELS + i] * rows[m * MOST_PIXELS + i]
-            out[j, m] = total
+                one, other = rows[WEIGHTED, i], rows[WEIGHTED + 1, i]
+                first, second = rows[m, i], rows[m + 1, i]
+                t00 += one * first
+                t01 += one * second
+                t10 += other * first
+                t11 += other * second
+            out[j, m], out[j, m + 1], out[j + 1, m], out[j + 1, m + 1] = t00, t01, t10, t11
 
 
 @jit_sums

@@ -8,11 +8,13 @@ from estimator.image.intrinsics import FloatArray
 from estimator.jit import jit
 
 # Rows of the collected pixels: ray and its Jacobian, grey, place along the sector; then, filled by
-# `locate`, distance to the outline, inward normal, curvature, derivatives by the geometry.
-X, Y, J0, J1, J2, J3, GREY, TAU, DISTANCE, NU, NV, BEND, GEOMETRY, ROWS = *range(13), 16
+# `locate`, distance to the outline, inward normal, curvature, derivatives by the geometry; last the
+# distance to where the outline has moved since.
+X, Y, J0, J1, J2, J3, GREY, TAU, DISTANCE, NU, NV, BEND, GEOMETRY, HERE, ROWS = *range(13), 16, 17
 _COARSE_PX, _TILE_PX, _SMALL_TILE_PX = 32, 8, 2
 _NEWTON_STEPS = 12
-_MOST_SECTORS = 256
+_MOST_SECTORS = 512
+_LAYERS = 48  # a sector's pixels are sorted by distance this finely
 
 
 @jit
@@ -61,8 +63,9 @@ def collect(
 ) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
     """Pixels from ``outer_px`` outside to ``inner_px`` inside the outline of (s, a), by sector.
 
-    Returns the pixels (ROWS, n) and the first index of each sector (sectors + 1,). A sector is
-    about ``sector_px`` of the outline's length; TAU runs from -0.5 to 0.5 along it.
+    Returns the pixels (ROWS, n), in each sector from the outside inwards, and the first index of
+    each sector (sectors + 1,). A sector is about ``sector_px`` of the outline's length; TAU runs
+    from -0.5 to 0.5 along it.
     """
     height, width = image.shape
     frame = outline_frame(s, a)
@@ -70,7 +73,7 @@ def collect(
     guide = _sector_guide(camera, s, frame, sphere, sector_px, height, width)
     # Half as much again as the band's area; lines may cross the image obliquely.
     most = int(1.6 * (guide[6] + 50.0) * (inner_px + outer_px + 2.0))
-    found = np.empty((most, 2), dtype=np.int64)
+    found = np.empty((most, 3), dtype=np.int64)
     taus = np.empty(most)
     # In the target's middle the distance is meaningless: never skip far there.
     inside_skip = 0.4 * camera[0] / np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2 - 1.0)
@@ -134,6 +137,7 @@ def _take(
         if not ray[0] * frame[1, 0] + ray[1] * frame[1, 1] + frame[1, 2] > 0.0:
             second = per_side
     d, nu, nv, bend = near[0], near[1], near[2], near[3]
+    per_layer = _LAYERS / (inner_px + outer_px)
     for v in range(top, min(top + tile, height)):
         for u in range(left, min(left + tile, width)):
             du, dv = u - left - middle, v - top - middle
@@ -151,7 +155,9 @@ def _take(
             else:
                 place = start + (du * guide[2] + dv * guide[3]) * guide[4]
                 sector = min(max(int(place), 0), per_side - 1)
-            found[count, 0], found[count, 1] = v * width + u, sector + second
+            layer = int((here + outer_px) * per_layer)
+            found[count, 0], found[count, 1] = u, v
+            found[count, 2] = (sector + second) * _LAYERS + min(layer, _LAYERS - 1)
             taus[count] = place - sector - 0.5
             count += 1
     return count
@@ -193,22 +199,40 @@ def _by_sector(
     sectors: int,
 ) -> tuple[FloatArray, NDArray[np.int64]]:  # fmt: skip
     """The found pixels with their rays and grey, so that each sector's are contiguous."""
-    width = image.shape[1]
-    starts = np.zeros(sectors + 1, dtype=np.int64)
+    place = np.zeros(sectors * _LAYERS + 1, dtype=np.int64)
     for i in range(found.shape[0]):
-        starts[found[i, 1] + 1] += 1
-    for k in range(sectors):
-        starts[k + 1] += starts[k]
-    place = starts.copy()
+        place[found[i, 2] + 1] += 1
+    for k in range(sectors * _LAYERS):
+        place[k + 1] += place[k]
+    starts = place[::_LAYERS].copy()
+    order = np.empty(found.shape[0], dtype=np.int64)
+    for i in range(found.shape[0]):
+        order[place[found[i, 2]]] = i
+        place[found[i, 2]] += 1
     pixels = np.empty((ROWS, found.shape[0]))
     ray = np.zeros(6)
-    for i in range(found.shape[0]):
-        v, u = found[i, 0] // width, found[i, 0] % width
-        at = place[found[i, 1]]
-        place[found[i, 1]] += 1
+    for at in range(found.shape[0]):
+        i = order[at]
+        u, v = found[i, 0], found[i, 1]
         ray_of_pixel(float(u), float(v), camera, ray)
         for j in range(6):
             pixels[j, at] = ray[j]
         pixels[GREY, at] = image[v, u]
         pixels[TAU, at] = taus[i]
     return pixels, starts
+
+
+@jit
+def thinned(
+    pixels: FloatArray, starts: NDArray[np.int64], stride: int
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Every ``stride``-th of each sector's pixels, as `collect` returns them (not located)."""
+    some_starts = np.zeros_like(starts)
+    for k in range(starts.shape[0] - 1):
+        some_starts[k + 1] = some_starts[k] + (starts[k + 1] - starts[k] + stride - 1) // stride
+    some = np.empty((ROWS, some_starts[-1]))
+    for k in range(starts.shape[0] - 1):
+        for i in range(some_starts[k], some_starts[k + 1]):
+            for j in range(DISTANCE):
+                some[j, i] = pixels[j, starts[k] + (i - some_starts[k]) * stride]
+    return some, some_starts

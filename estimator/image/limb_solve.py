@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 
 from estimator.image.cone import moved, outline_frame
 from estimator.image.intrinsics import FloatArray
-from estimator.image.limb_edge import BLUR, PHOTOMETRY
+from estimator.image.limb_edge import ALL_ROWS, BLUR, MOST_PIXELS, PHOTOMETRY
 from estimator.image.limb_linear import cholesky, solve_column, solve_fixed
 from estimator.image.limb_locate import locate
 from estimator.image.limb_noise import learn_ridge, noise_levels
 from estimator.image.limb_normal import STATS, accumulate
+from estimator.image.limb_pixels import thinned
 from estimator.jit import jit
 
 # Prior of the blur parameters (q, M1, h1, M12, M2, h2): sharp to 4 px of motion are likely.
@@ -17,6 +18,9 @@ _BLUR_MEAN = np.array([0.2, 0.5, 0.0, 0.0, 0.5, 0.0])
 _BLUR_SD = np.array([2.0, 8.0, 1.0, 8.0, 8.0, 1.0])
 # Between sharp and 3 px of motion: both are reached from there in few steps.
 _BLUR_START = np.array([0.3, 1.5, 0.0, 0.0, 1.5, 0.0])
+_BLUR_START_CYLINDER = np.array([0.3, 3.0, 0.0, 0.0, 0.0, 0.0])
+# What an image tells about the next one: the blur, the turn of its axes, the two noise levels.
+KNOWN = BLUR + 3
 _WIDE_Q = 4.0  # widens the model's edge at first, so that a wrong guess is within its reach
 _HEAVY_TAIL = 30.0
 # Texture is correlated: its variance counts twice. Not along a cylinder's long sectors, where once
@@ -35,16 +39,21 @@ _FREE = np.array([1e-6, 1 / 400.0, 1 / 16.0, 1e-6, 1 / 400.0, 1 / 16.0, 1 / 400.
 
 @jit
 def solve_outline(
-    pixels: FloatArray, starts: NDArray[np.int64], s: FloatArray, a: FloatArray, geometry: int
+    pixels: FloatArray, starts: NDArray[np.int64], s: FloatArray, a: FloatArray, geometry: int,
+    known: FloatArray,
 ) -> tuple[
     FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray,
-    FloatArray, FloatArray,
+    FloatArray, FloatArray, FloatArray,
 ]:  # fmt: skip
     """Refine (s, a) on the collected pixels; ``geometry`` is 3 for a sphere, 4 for a cylinder.
 
+    ``known`` (KNOWN,) is what an image just before told of blur and noise, which saves the steps
+    that look for them; empty if there is none.
+
     Returns s, a, blur (BLUR,), photometry (sectors, PHOTOMETRY), the sectors' statistics (sectors,
     STATS), noise (sectors, 2), the covariances of s (3, 3) from the model and from the scatter of
-    the sectors' scores, and the last step. s is NaN when the equations had no solution.
+    the sectors' scores, the last step, and what is now known. s is NaN when the equations had no
+    solution.
     """
     sectors, n = starts.shape[0] - 1, geometry + BLUR
     information, score = np.zeros((sectors, n, n)), np.zeros((sectors, n))
@@ -55,16 +64,24 @@ def solve_outline(
     texture_weight = _TEXTURE_WEIGHT_SPHERE if geometry == 3 else _TEXTURE_WEIGHT_CYLINDER
     blur, turn_rad = _first_blur(s, a, geometry)
     ridge = _STIFF.copy()
+    if known.shape[0] > 0:
+        turn_rad = known[BLUR] if geometry == 3 else turn_rad
+        blur, noise[:, 0], noise[:, 1] = known[:BLUR].copy(), known[BLUR + 1], known[BLUR + 2]
     total, step, frame = np.eye(n), np.zeros(n), outline_frame(s, a)
     s_there, a_there, moved_by = s, a, np.zeros(geometry)
-    locate(pixels, s, a, frame)
-    for index in range(-1, _ALL_STEPS):
+    work = np.zeros((3, ALL_ROWS * MOST_PIXELS))
+    used, used_starts = thinned(pixels, starts, _COARSE_STRIDE)
+    locate(used, s, a, frame)
+    index = -2
+    while index < _ALL_STEPS - 1:
+        index = _COARSE_STEPS if index == -1 and known.shape[0] > 0 else index + 1
         fine = index >= _COARSE_STEPS
+        settled = index > _COARSE_STEPS or (fine and known.shape[0] == 0)
         accumulate(
-            pixels, starts, 1 if fine else _COARSE_STRIDE, moved_by, blur, turn_rad, photometry,
+            used, used_starts, moved_by, blur, turn_rad, photometry,
             noise, ridge, 0.0 if index < 0 else _HEAVY_TAIL,
-            _FINE_MARGIN_PX if fine else _COARSE_MARGIN_PX, information, score, back, spread,
-            stats,
+            _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, information, score, back, spread,
+            stats, work,
         )  # fmt: skip
         if index >= 0:
             total, step = _step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
@@ -79,20 +96,23 @@ def solve_outline(
             break
         _back_substitute(back, step, photometry)
         if index == _GEOMETRY_STEPS - 1:
-            blur[:] = _BLUR_START
-            if geometry == 4:
-                blur[1], blur[4] = blur[1] + blur[4], 0.0
-        if index == _COARSE_STEPS - 1:
+            blur[:] = _BLUR_START if geometry == 3 else _BLUR_START_CYLINDER
+        all_next = index == _COARSE_STEPS - 1 or (index < 0 and known.shape[0] > 0)
+        if all_next:
             ridge = _FREE.copy()
-        if index == _GEOMETRY_STEPS - 1 or index == _COARSE_STEPS - 1:
+            used, used_starts = pixels, starts
+        if index == _GEOMETRY_STEPS - 1 or all_next:
             s_there, a_there, frame, moved_by = s, a, outline_frame(s, a), np.zeros(geometry)
-            locate(pixels, s, a, frame)
+            locate(used, s, a, frame)
         if fine and index < _COARSE_STEPS + _LEARNING_STEPS:
             learn_ridge(photometry, spread, stats, ridge, index == _COARSE_STEPS)
         if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and step_rad(step, s) < _CONVERGED_RAD:
             break
     model, scatter = _covariances(total, information, score, frame, s)
-    return s, a, blur, photometry, stats, noise, model, scatter, step
+    learnt = np.empty(KNOWN)
+    learnt[:BLUR], learnt[BLUR] = blur, turn_rad
+    learnt[BLUR + 1], learnt[BLUR + 2] = noise[0, 0], np.mean(noise[:, 1])
+    return s, a, blur, photometry, stats, noise, model, scatter, step, learnt
 
 
 @jit

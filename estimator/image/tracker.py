@@ -58,10 +58,12 @@ class TargetTracker:
         self._camera = pack_camera(intrinsics)
         self._moments = MomentsMeter(intrinsics) if method == "moments" else None
         self._memory: _Memory | None = None
+        self._learnt: FloatArray | None = None  # of blur and noise, from the last image measured
 
     def reset(self) -> None:
         """Forget all earlier images."""
         self._memory = None
+        self._learnt = None
 
     def measure(self, image: GreyImage, predicted: Feature | None = None) -> Measurement:
         """The target's feature in one grey uint8 image (height, width), or why there is none.
@@ -153,7 +155,8 @@ class TargetTracker:
         doubt = sphere_doubt(fit, shape) if axis is None else cylinder_doubt(fit)
         if doubt:
             return Measurement(None, doubt)
-        return refined(image, self.intrinsics, self._camera, fit)
+        result, self._learnt = refined(image, self.intrinsics, self._camera, fit, self._learnt)
+        return result
 
     def _plausible(self, feature: Feature, reference: Feature, frames_gone: int) -> bool:
         """Whether a target seen at ``reference`` can be at ``feature`` this many frames later."""

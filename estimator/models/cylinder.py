@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.cross import cross
+from estimator.flow import follow, structures
 from estimator.image.feature import Feature
+from estimator.jit import jit, jit_template
 
 FloatArray = NDArray[np.float64]
 
@@ -15,6 +16,11 @@ class Cylinder:
 
     The state is (s, a) (6,), so Ωᵀ is (a aᵀ − I) v above three zeros.
     """
+
+    @property
+    def m(self) -> int:
+        """Six: P0 in radii and the axis."""
+        return 6
 
     @property
     def p(self) -> int:
@@ -44,18 +50,55 @@ class Cylinder:
         return float(chi[0])
 
     def f_m(self, s: FloatArray, u: FloatArray) -> FloatArray:
-        """([s]× ω, [a]× ω) (..., 6)."""
-        halves = s.reshape(*s.shape[:-1], 2, 3)
-        return cross(halves, u[..., None, 3:]).reshape(s.shape)
+        """([s]× ω, [a]× ω) (6,)."""
+        return _f_m(s, u)
 
     def Omega(self, s: FloatArray, v: FloatArray) -> FloatArray:
-        """(vᵀ (a aᵀ − I), 0) (..., 1, 6)."""
-        a = s[..., 3:]
-        along = (a * v).sum(axis=-1, keepdims=True)
-        rows = np.zeros((*s.shape[:-1], 1, 6))
-        rows[..., 0, :3] = a * along - v
-        return rows
+        """(vᵀ (a aᵀ − I), 0) (1, 6)."""
+        return _Omega(s, v)
 
     def f_u(self, s: FloatArray, chi: FloatArray, u: FloatArray) -> FloatArray:
         """Zero: the radius does not change."""
-        return np.zeros_like(chi)
+        return _f_u(s, chi, u)
+
+    def flow(
+        self, s0: FloatArray, chi0: FloatArray, times_s: FloatArray, twists: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """See ``Model.flow``."""
+        return _flow(s0, chi0, times_s, twists)
+
+    def structures(self, s: FloatArray, twists: FloatArray) -> FloatArray:
+        """See ``Model.structures``."""
+        return _structures(s, twists)
+
+
+@jit_template
+def _f_m(s: FloatArray, u: FloatArray) -> FloatArray:
+    wx, wy, wz = u[3], u[4], u[5]
+    s_dot = [s[1] * wz - s[2] * wy, s[2] * wx - s[0] * wz, s[0] * wy - s[1] * wx]
+    a_dot = [s[4] * wz - s[5] * wy, s[5] * wx - s[3] * wz, s[3] * wy - s[4] * wx]
+    return np.array(s_dot + a_dot)
+
+
+@jit_template
+def _Omega(s: FloatArray, v: FloatArray) -> FloatArray:
+    ax, ay, az = s[3], s[4], s[5]
+    along = ax * v[0] + ay * v[1] + az * v[2]
+    return np.array([[ax * along - v[0], ay * along - v[1], az * along - v[2], 0.0, 0.0, 0.0]])
+
+
+@jit_template
+def _f_u(s: FloatArray, chi: FloatArray, u: FloatArray) -> FloatArray:
+    return np.zeros(1)
+
+
+@jit
+def _flow(
+    s0: FloatArray, chi0: FloatArray, times_s: FloatArray, twists: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    return follow(_f_m, _Omega, _f_u, s0, chi0, times_s, twists)
+
+
+@jit
+def _structures(s: FloatArray, twists: FloatArray) -> FloatArray:
+    return structures(_Omega, s, twists)

@@ -15,9 +15,17 @@ class Model(Protocol):
 
     ``s`` (m,) is everything an image measures that the dynamics need: for the cylinder the
     paper's s followed by the axis a, whose rows of Ωᵀ are zero. ``chi`` (p,) is what no image
-    shows. ``u`` = (v, ω) is the camera's twist in its own frame. Every method that takes arrays
-    of states also takes leading batch dimensions and broadcasts them.
+    shows. ``u`` = (v, ω) is the camera's twist in its own frame.
+
+    The three terms are written once, as templates for compilation; ``flow`` and ``structures``
+    apply them along a motion, compiled by two kernels that do nothing but hand the terms to the
+    functions of ``estimator.flow``.
     """
+
+    @property
+    def m(self) -> int:
+        """The number of measured quantities in s."""
+        ...
 
     @property
     def p(self) -> int:
@@ -41,13 +49,27 @@ class Model(Protocol):
         ...
 
     def f_m(self, s: FloatArray, u: FloatArray) -> FloatArray:
-        """The part of ṡ (..., m) that does not depend on χ."""
+        """The part of ṡ (m,) that does not depend on χ."""
         ...
 
     def Omega(self, s: FloatArray, v: FloatArray) -> FloatArray:
-        """Ω (..., p, m), linear in the camera's linear velocity v (..., 3)."""
+        """Ω (p, m), linear in the camera's linear velocity v (3,)."""
         ...
 
     def f_u(self, s: FloatArray, chi: FloatArray, u: FloatArray) -> FloatArray:
-        """χ̇ (..., p)."""
+        """χ̇ (p,)."""
+        ...
+
+    def flow(
+        self, s0: FloatArray, chi0: FloatArray, times_s: FloatArray, twists: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """(1) integrated: s (b, n, m) and χ (b, n, p) at ``times_s`` (n,), twists (n, 6) between.
+
+        From b starts s0 (b, m), χ0 (b, p). Where the twist is too fast to be followed, and from
+        there on, the result is NaN.
+        """
+        ...
+
+    def structures(self, s: FloatArray, twists: FloatArray) -> FloatArray:
+        """Ω (n, p, m) at n states s (n, m) and twists (n, 6)."""
         ...

@@ -117,14 +117,19 @@ def test_a_cylinders_axis_is_read_with_the_sign_that_was_tracked() -> None:
 
 
 @pytest.mark.parametrize("model", [Sphere(), Cylinder()])
-def test_models_take_batches_as_they_take_single_states(model: Model) -> None:
+def test_the_compiled_terms_are_those_the_model_states(model: Model) -> None:
     rng = np.random.default_rng(3)
-    m = 3 if isinstance(model, Sphere) else 6
-    s, u = rng.standard_normal((2, 5, m)), rng.standard_normal((5, 6))
-    f_m, Omega = model.f_m(s, u), model.Omega(s, u[:, :3])
-    assert Omega.shape[-2:] == (model.p, m)
-    for i in range(2):
-        for j in range(5):
-            np.testing.assert_allclose(f_m[i, j], model.f_m(s[i, j], u[j]), atol=1e-15)
-            single = model.Omega(s[i, j], u[j, :3])
-            np.testing.assert_allclose(np.broadcast_to(Omega, (2, 5, 1, m))[i, j], single)
+    m, h = (3 if isinstance(model, Sphere) else 6), 1e-6
+    s, u = rng.standard_normal((4, m)), rng.standard_normal((4, 6))
+    chi = rng.standard_normal((4, model.p))
+    Omega = model.structures(s, u)
+    assert Omega.shape == (4, model.p, m)
+    for k in range(4):
+        np.testing.assert_array_equal(Omega[k], model.Omega(s[k], u[k, :3]))
+        steady = np.array([u[k], u[k]])
+        s_after, chi_after = model.flow(s[k : k + 1], chi[k : k + 1], np.array([0.0, h]), steady)
+        rate = model.f_m(s[k], u[k]) + Omega[k].T @ chi[k]
+        np.testing.assert_allclose((s_after[0, 1] - s[k]) / h, rate, atol=1e-4)
+        np.testing.assert_allclose(
+            (chi_after[0, 1] - chi[k]) / h, model.f_u(s[k], chi[k], u[k]), atol=1e-4
+        )
