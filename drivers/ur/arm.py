@@ -1,6 +1,7 @@
 """A Universal Robots arm behind the ``Arm`` interface."""
 
 import hashlib
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.errors import ConnectError, OperateError
-from drivers.interfaces import ArmState
+from drivers.interfaces import ArmState, Joints
 from drivers.ur.faults import (
     ArmConnectionError,
     ArmProcessError,
@@ -17,8 +18,10 @@ from drivers.ur.faults import (
     fault_of,
 )
 from drivers.ur.geometry import to_tool_axes
+from drivers.ur.kinematics import Kinematics, identify
 from drivers.ur.link import ChildLink
 from drivers.ur.messages import Command, Order
+from drivers.ur.noise import FEWEST_SAMPLES, noise_at_rest
 from drivers.ur.recovery import recover_controller
 from drivers.ur.ring import Sample
 from drivers.ur.settings import UrSettings
@@ -26,13 +29,17 @@ from drivers.ur.settings import UrSettings
 FloatArray = NDArray[np.float64]
 
 _SAME_TCP = 1e-5  # m and rad
+_REST_WAIT_S = 0.25
 
 
 class UrArm:
     """The arm; a child process holds the connection, the controller's watchdog guards both.
 
-    ``clock`` must be the machine's monotonic clock. Raises ConnectError when the arm cannot be
-    reached or made ready, or when its TCP is not the one of ``settings.tcp_offset``.
+    ``clock`` must be the machine's monotonic clock. The states' uncertainties are measured when
+    connecting: of their instants from the round trip, of their twists at rest.
+
+    Raises ConnectError when the arm cannot be reached or made ready, or when its TCP is not the
+    one of ``settings.tcp_offset``.
     """
 
     def __init__(self, settings: UrSettings, clock: Clock) -> None:
@@ -45,7 +52,12 @@ class UrArm:
     def _open(self) -> None:
         self._link = ChildLink(self._settings, self._clock)
         self._next = 0  # number of the first sample not returned yet
-        self.tcp_offset = self._link.ready.tcp_offset  # (x, y, z, rx, ry, rz), m and rad
+        self._kinematics: Kinematics | None = None
+        self._identified = False
+        ready = self._link.ready
+        self._t_std_s = ready.round_trip_s / math.sqrt(12.0)
+        self._noise = noise_at_rest(self._first_samples())
+        self.tcp_offset = ready.tcp_offset  # (x, y, z, rx, ry, rz), m and rad
         pinned = self._settings.tcp_offset
         if pinned is not None and not _same(pinned, self.tcp_offset):
             self._link.close(_order(Order.CLOSE))
@@ -54,6 +66,13 @@ class UrArm:
                 f"the rig was calibrated with {_text(pinned)}: set it back on the pendant or "
                 "calibrate again"
             )
+
+    def _first_samples(self) -> list[Sample]:
+        ring, clock = self._link.ring, self._clock
+        deadline_s = clock.now_s() + _REST_WAIT_S
+        while ring.count < FEWEST_SAMPLES and clock.now_s() < deadline_s:
+            clock.sleep_until(clock.now_s() + 0.01)
+        return ring.since(0)[0]
 
     @property
     def tcp_hash(self) -> str:
@@ -80,7 +99,17 @@ class UrArm:
         """
         self._check()
         samples, self._next = self._link.ring.since(self._next)
-        return [_state(sample) for sample in samples]
+        return [_state(sample, self._t_std_s, self._noise) for sample in samples]
+
+    def joints(self) -> Joints | None:
+        """The joints at the newest sample; None before it, or for a model not known."""
+        sample = self._link.ring.newest()
+        if sample is None:
+            return None
+        if not self._identified:
+            self._kinematics = identify(sample.q_rad, sample.T_base_tool, self.tcp_offset)
+            self._identified = True
+        return None if self._kinematics is None else self._kinematics.joints(sample.q_rad)
 
     def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
         """Follow ``twist_tool`` (6,), held in the tool's axes, for ``hold_s`` from now.
@@ -168,11 +197,13 @@ def _order(order: Order) -> Command:
     return Command(order, np.zeros(6), 0.0)
 
 
-def _state(sample: Sample) -> ArmState:
+def _state(sample: Sample, t_std_s: float, twist_std: FloatArray | None) -> ArmState:
     return ArmState(
         t_s=sample.t_s,
         T_base_tool=sample.T_base_tool,
         twist_tool=to_tool_axes(sample.T_base_tool[:3, :3], sample.twist_base),
+        t_std_s=t_std_s,
+        twist_std=twist_std,
     )
 
 

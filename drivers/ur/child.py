@@ -57,7 +57,8 @@ class Child:
         except RigError as error:
             self._tell(Event("refused", str(error)))
             return 1
-        self._tell(Event("ready", "", tcp_offset, stream.version, stream.rate_hz))
+        facts = (tcp_offset, stream.version, stream.rate_hz, stream.round_trip_s)
+        self._tell(Event("ready", "", *facts))
         try:
             while not self._ending:
                 self._turn(motor)

@@ -53,6 +53,7 @@ class Event:
     tcp_offset: tuple[float, ...] = ()
     version: tuple[int, ...] = ()
     rate_hz: float = 0.0
+    round_trip_s: float = 0.0  # the shortest of a request to the controller
 
     def to_bytes(self) -> bytes:
         """The packet."""

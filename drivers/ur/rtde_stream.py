@@ -14,6 +14,7 @@ from drivers.ur.rtde_codec import FrameBuffer, Kind, Message, Recipe, RtdeError,
 
 RTDE_PORT = 30004
 _CB3 = 3
+_ROUND_TRIPS = 5
 _REQUIRED = {
     "timestamp": "DOUBLE",
     "actual_TCP_pose": "VECTOR6D",
@@ -31,6 +32,8 @@ _OPTIONAL = {"tcp_offset": "VECTOR6D"}  # not known to older controllers
 class RtdeStream:
     """A started state stream: 500 Hz, or 125 Hz from a CB3 controller.
 
+    ``round_trip_s`` is the shortest that a request took: more than any sample is delayed for
+    sure, and so what its time stamp, mapped to the host's clock, may be off at most.
     Raises ConnectError when the controller cannot be reached or refuses.
     """
 
@@ -77,7 +80,12 @@ class RtdeStream:
     def _set_up(self) -> None:
         if self._request(Kind.PROTOCOL_VERSION, struct.pack(">H", 2))[:1] != b"\x01":
             raise RtdeError("protocol version 2 is refused")
-        reply = self._request(Kind.CONTROLLER_VERSION)
+        reply, trips_s = b"", []
+        for _ in range(_ROUND_TRIPS):
+            asked_s = self._clock.now_s()
+            reply = self._request(Kind.CONTROLLER_VERSION)
+            trips_s.append(self._clock.now_s() - asked_s)
+        self.round_trip_s = min(trips_s)
         self.version: tuple[int, ...] = struct.unpack(">4I", reply)
         self.rate_hz = 500.0 if self.version[0] > _CB3 else 125.0
         wanted = _REQUIRED | _OPTIONAL

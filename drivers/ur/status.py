@@ -27,7 +27,7 @@ class UrStatus:
     safety: str  # "normal", "protective stop", …
     robot_mode: str  # "running", "power off", …
     program: str  # "stopped", "playing", …
-    remote_control: bool
+    remote_control: bool | None  # None where the controller has no such mode (CB3)
     speed_scaling: float
     T_base_tool: FloatArray  # (4, 4)
     twist_base: FloatArray  # (6,)
@@ -86,13 +86,13 @@ def _listen(stream: RtdeStream, clock: Clock, look_s: float) -> list[Sample]:
     return samples
 
 
-def _dashboard_facts(host: str, timeout_s: float) -> tuple[str, str, bool]:
-    """Serial number, model and remote-control mode; blank where there is no dashboard."""
+def _dashboard_facts(host: str, timeout_s: float) -> tuple[str, str, bool | None]:
+    """Serial number, model and remote-control mode; blank or None where nobody says."""
     try:
         with Dashboard(host, timeout_s) as dashboard:
             serial = dashboard.ask("get serial number")
             model = dashboard.ask("get robot model")
             remote = dashboard.ask("is in remote control")
     except ConnectError:
-        return "", "", False
-    return serial, model, remote.lower() == "true"
+        return "", "", None
+    return serial, model, {"true": True, "false": False}.get(remote.lower())

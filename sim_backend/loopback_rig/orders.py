@@ -69,6 +69,6 @@ def _answer(faulty: Faulty, line: bytes) -> dict[str, Any]:
         if request.get("do") == "clear":
             faulty.clear()
             return {"done": True}
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
         return {"error": str(error)}
     return {"error": "unknown order; known: fault, do clear"}

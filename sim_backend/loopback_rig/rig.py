@@ -26,6 +26,7 @@ from sim_backend.loopback_grbl.process import LoopbackGantryProcess
 from sim_backend.loopback_rig.orders import OrderServer
 from sim_backend.loopback_rig.remote import MotionSource, RemoteMotion
 from sim_backend.loopback_ur import kinematics as ur_kinematics
+from sim_backend.loopback_ur.config import version_of
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
 from sim_backend.render_choice import choose_renderer, make_renderer
 from sim_backend.rig import mount
@@ -57,7 +58,8 @@ class LoopbackRig:
     """An emulated arm and, if asked for, the camera on its tool, until closed.
 
     ``arm`` is "ur" (a UR5e on the controller's own ports of ``host``) or "grbl" (a gantry on a
-    pseudo-terminal at ``link``). Raises ConfigError for a start the arm cannot reach,
+    pseudo-terminal at ``link``); ``ur_version`` is the UR controller's software, of which 3.… is
+    a CB3. Raises ConfigError for a start the arm cannot reach or a version that is none,
     ConnectError for ports already taken.
     """
 
@@ -71,8 +73,11 @@ class LoopbackRig:
         link: Path,
         camera_port: int | None,
         lifetime_s: float,
+        ur_version: str | None = None,
     ) -> None:
         _check_loopback(host)
+        _check_version(ur_version)
+        self._ur_version = ur_version
         self._stack = ExitStack()
         self.stream: MjpegServer | None = None
         try:
@@ -101,7 +106,9 @@ class LoopbackRig:
             T_flange_tool = np.eye(4)
             q = ur_kinematics.joints_for(T_base_tool, ur_kinematics.HOME_Q, T_flange_tool)
             ur = self._stack.enter_context(
-                LoopbackProcess(host, lifetime_s, q_start=tuple(q.tolist()))
+                LoopbackProcess(
+                    host, lifetime_s, q_start=tuple(q.tolist()), version=self._ur_version
+                )
             )
             pose = partial(ur_kinematics.tool_pose, T_flange_tool=T_flange_tool)
             source = LoopbackControl(host)
@@ -186,6 +193,14 @@ def _check_loopback(host: str) -> None:
         raise ConfigError(
             f"--host {host}: an emulated rig listens on loopback addresses only (127.0.0.1, …)"
         )
+
+
+def _check_version(ur_version: str | None) -> None:
+    if ur_version is not None:
+        try:
+            version_of(ur_version)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
 
 
 def _later(delay_s: float, action: Callable[[], None]) -> None:

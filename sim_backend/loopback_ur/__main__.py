@@ -7,7 +7,7 @@ import sys
 import threading
 
 from drivers.clock import WallClock
-from sim_backend.loopback_ur.controller import ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig, version_of
 from sim_backend.loopback_ur.kinematics import HOME_Q
 from sim_backend.loopback_ur.server import LoopbackServer
 
@@ -24,12 +24,15 @@ def main() -> int:
     home = tuple(float(x) for x in HOME_Q)
     parser.add_argument("--q-start", type=_six_numbers, default=home)
     parser.add_argument("--seed", type=int, default=0)
+    latest = ControllerConfig().version
+    parser.add_argument("--version", type=version_of, default=latest, help="3.… is a CB3")
     parser.add_argument("--end-with-stdin", action="store_true")
     options = parser.parse_args()
     config = ControllerConfig(
         unlock_after_s=options.unlock_after_s,
         tcp_offset=options.tcp_offset,
         q_start=options.q_start,
+        version=options.version,
     )
     # It stands for another machine: it should not wait for the programs on this one.
     with contextlib.suppress(OSError):

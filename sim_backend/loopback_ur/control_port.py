@@ -1,21 +1,27 @@
-"""The emulation's own port: JSON lines that order faults and ask for the truth."""
+"""The emulation's own port: JSON lines that order faults, stand for a person at the pendant,
+and ask for the truth.
+"""
 
 import json
 
 import numpy as np
 
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.faults import Faults, fault_kind
+from sim_backend.loopback_ur.kinematics import transform
 from sim_backend.loopback_ur.truth import ArmTruth
 
 _MOST_ROWS = 5000  # ten seconds
 
 
 class ControlPort:
-    """Answers ``{"fault": kind, "after_s", "for_s"}``, ``{"do": "clear"}`` and
+    """Answers ``{"fault": kind, "after_s", "for_s"}``, ``{"do": "clear"}``,
+    ``{"slider": fraction}``, ``{"tcp": [x, y, z, rx, ry, rz]}`` and
     ``{"get": "motion", "since_s"}``.
     """
 
-    def __init__(self, faults: Faults, truth: ArmTruth) -> None:
+    def __init__(self, controller: Controller, faults: Faults, truth: ArmTruth) -> None:
+        self._controller = controller
         self._faults = faults
         self._truth = truth
 
@@ -26,7 +32,7 @@ class ControlPort:
             if not isinstance(request, dict):
                 raise ValueError("a request is a JSON object")
             return json.dumps(self._reply(request))
-        except (ValueError, OverflowError) as error:
+        except (ValueError, TypeError, OverflowError, RecursionError) as error:
             return json.dumps({"error": str(error)})
 
     def _reply(self, request: dict[str, object]) -> dict[str, object]:
@@ -37,9 +43,15 @@ class ControlPort:
         if request.get("do") == "clear":
             self._faults.clear()
             return {"ok": True}
+        if "slider" in request:
+            self._controller.set_slider(float(str(request["slider"])))
+            return {"ok": True}
+        if "tcp" in request:
+            self._controller.motion.set_tool(transform(_pose(request["tcp"])))
+            return {"ok": True}
         if request.get("get") == "motion":
             return {"motion": self._motion(float(str(request.get("since_s", 0.0))))}
-        raise ValueError("known requests: fault, do: clear, get: motion")
+        raise ValueError("known requests: fault, do: clear, slider, tcp, get: motion")
 
     def _motion(self, since_s: float) -> list[list[float]]:
         """Rows (t_s, q (6), qd (6)) since an instant, at most the last ten seconds."""
@@ -50,3 +62,11 @@ class ControlPort:
         times = history.start_s + numbers * history.step_s
         rows: list[list[float]] = np.column_stack([times, q, qd]).tolist()
         return rows
+
+
+def _pose(value: object) -> tuple[float, ...]:
+    """Six finite numbers; raises ValueError for anything else."""
+    pose = tuple(float(str(part)) for part in value) if isinstance(value, list) else ()
+    if len(pose) != 6 or not np.all(np.isfinite(pose)):
+        raise ValueError(f"a TCP is six numbers (x, y, z, rx, ry, rz), not {value!r}")
+    return pose

@@ -1,16 +1,17 @@
 """The emulated controller: one cycle of 2 ms after another, no sockets and no clock.
 
-Assumed: any stop of the program, also by the safety system, ends it (it must be uploaded
-again); an emergency stop also cuts the power, and is released by a person at the button.
+A controller of version 3 (CB3) looks at its registers and reports every fourth cycle only; the
+arm stays a UR5e. Assumed: any stop of the program, also by the safety system, ends it (it must
+be uploaded again); an emergency stop also cuts the power, and is released by a person at the
+button; the reason of a protective stop is sent as a text to whoever listens.
 """
-
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivers.ur.rtde_codec import Value
-from sim_backend.loopback_ur.kinematics import HOME_Q, pose_vector, tool_pose, transform
-from sim_backend.loopback_ur.motion import STEP_S, Motion, MotionConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.kinematics import pose_vector, transform
+from sim_backend.loopback_ur.motion import STEP_S, Motion
 from sim_backend.loopback_ur.program import ControlProgram, watchdog_cycles
 from sim_backend.loopback_ur.safety import (
     RobotMode,
@@ -19,25 +20,10 @@ from sim_backend.loopback_ur.safety import (
     robot_status_bits,
     safety_status_bits,
 )
-from sim_backend.loopback_ur.variables import INPUTS, OUTPUTS
+from sim_backend.loopback_ur.variables import INPUTS, zero_of
 
-_ZERO_OF = {"VECTOR3D": (0.0,) * 3, "VECTOR6D": (0.0,) * 6, "VECTOR6INT32": (0,) * 6}
 _JOINT_RUNNING = 253
-
-
-@dataclass(frozen=True, slots=True)
-class ControllerConfig:
-    """Which controller is emulated."""
-
-    version: tuple[int, int, int, int] = (5, 15, 0, 0)
-    serial_number: str = "20225500001"
-    tcp_offset: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    q_start: tuple[float, ...] = tuple(float(x) for x in HOME_Q)
-    timestamp_start_s: float = 1000.0  # the controller's clock has an origin of its own
-    clock_error: float = 20e-6  # and a rate of its own
-    speed_noise_rad_s: float = 1e-4  # of each reported joint speed
-    unlock_after_s: float = 5.0  # a protective stop cannot be unlocked earlier
-    motion: MotionConfig = field(default_factory=MotionConfig)
+_MOST_TEXTS = 16
 
 
 class Controller:
@@ -56,13 +42,12 @@ class Controller:
         self.motion = Motion(
             config.motion, np.array(config.q_start), transform(tuple(config.tcp_offset))
         )
-        self.inputs: dict[str, Value] = {
-            name: _ZERO_OF.get(kind, 0) for name, kind in INPUTS.items()
-        }
+        self.inputs: dict[str, Value] = {name: zero_of(kind) for name, kind in INPUTS.items()}
         self._program: ControlProgram | None = None
         self._command_seen_cycle = 0
         self._stopped_cycle = 0
         self._registers: dict[str, Value] = {}
+        self._texts: list[str] = []
         self._random = np.random.default_rng([seed, 30004])
         self._slider = 1.0
 
@@ -95,6 +80,17 @@ class Controller:
             self._command_seen_cycle = self.cycle + self.owed_cycles
         if "speed_slider_fraction" in values and self.inputs["speed_slider_mask"]:
             self._slider = float(np.clip(self.inputs["speed_slider_fraction"], 0.0, 1.0))
+
+    def set_slider(self, fraction: float) -> None:
+        """Somebody moves the speed slider at the pendant; raises ValueError outside [0, 1]."""
+        if not 0.0 <= fraction <= 1.0:
+            raise ValueError(f"the speed slider goes from 0 to 1, not to {fraction!r}")
+        self._slider = fraction
+
+    def take_texts(self) -> list[str]:
+        """What the controller has to say since the last call."""
+        texts, self._texts = self._texts, []
+        return texts
 
     def start_program(self, text: str) -> None:
         """Run an uploaded script, replacing the one that runs.
@@ -131,10 +127,12 @@ class Controller:
         self.runtime = RuntimeState.PLAYING
         return True
 
-    def protective_stop(self) -> None:
-        """What a collision or a joint beyond its speed does."""
+    def protective_stop(self, reason: str = "") -> None:
+        """What a collision does, and asking for what the arm cannot do."""
         if self.safety_mode is SafetyMode.NORMAL:
             self._safety_stop(SafetyMode.PROTECTIVE_STOP)
+            self._texts.append("protective stop" + (f": {reason}" if reason else ""))
+            del self._texts[:-_MOST_TEXTS]
 
     def emergency_stop(self) -> None:
         """Somebody presses the red button; it stays pressed."""
@@ -158,7 +156,8 @@ class Controller:
         """One cycle: watchdog, program, motion."""
         self.cycle += 1
         program = self._program
-        if program is not None and self.runtime is RuntimeState.PLAYING:
+        ticks = self.cycle % self.config.cycles_per_tick == 0
+        if ticks and program is not None and self.runtime is RuntimeState.PLAYING:
             silent = self.cycle - self._command_seen_cycle
             period_s = program.watchdog_s
             if period_s is not None and silent > watchdog_cycles(period_s):
@@ -171,8 +170,8 @@ class Controller:
                     self.stop_program()
         self.motion.speed_scaling = self._slider
         self.motion.step()
-        if self.motion.overspeed:
-            self.protective_stop()
+        if self.motion.violation is not None:
+            self.protective_stop(self.motion.violation)
         if self._losing_power and self.motion.at_rest:
             self._losing_power = False
             self.robot_mode = RobotMode.POWER_OFF
@@ -180,9 +179,8 @@ class Controller:
     def outputs(self) -> dict[str, Value]:
         """The present value of every output that is not constantly zero."""
         motion = self.motion
-        noise = self._random.standard_normal(6) * self.config.speed_noise_rad_s
-        qd = motion.qd + noise
-        T_target = tool_pose(motion.q_target, motion.T_flange_tool)
+        qd = motion.qd + self._random.standard_normal(6) * self.config.speed_noise_rad_s
+        (T, J), (T_target, J_target) = motion.actual(), motion.target()
         scaling = self._slider
         return {
             **self._registers,
@@ -191,10 +189,10 @@ class Controller:
             "actual_qd": _tuple(qd),
             "target_q": _tuple(motion.q_target),
             "target_qd": _tuple(motion.qd_target),
-            "actual_TCP_pose": pose_vector(motion.T_base_tool),
-            "actual_TCP_speed": _tuple(motion.J @ qd),
+            "actual_TCP_pose": pose_vector(T),
+            "actual_TCP_speed": _tuple(J @ qd),
             "target_TCP_pose": pose_vector(T_target),
-            "target_TCP_speed": _tuple(motion.J @ motion.qd_target),
+            "target_TCP_speed": _tuple(J_target @ motion.qd_target),
             "tcp_offset": pose_vector(motion.T_flange_tool),
             "robot_mode": int(self.robot_mode),
             "joint_mode": (_JOINT_RUNNING,) * 6,
@@ -215,10 +213,5 @@ class Controller:
         self.motion.stop_joint(self.config.motion.protective_stop_rad_s2)
 
 
-def zero_of(name: str) -> Value:
-    """The value of an output that the emulation does not compute."""
-    return _ZERO_OF.get(OUTPUTS[name], 0)
-
-
 def _tuple(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[float, ...]:
-    return tuple(float(x) for x in values)
+    return tuple(values.tolist())

@@ -1,4 +1,7 @@
-"""The dashboard: one line in, one line out; the texts are those of the dashboard server's guide."""
+"""The dashboard: one line in, one line out; the texts are those of the dashboard server's guide.
+
+A CB3 has no remote-control mode and does not understand being asked for it.
+"""
 
 from collections.abc import Callable
 
@@ -26,7 +29,6 @@ _ACKNOWLEDGED = {
     "restart safety": "Restarting safety",
     "get loaded program": "No program loaded",
     "get robot model": "UR5",
-    "is in remote control": "true",
     "quit": "Disconnected",
 }
 
@@ -48,6 +50,7 @@ class Dashboard:
             "pause": lambda: "Pausing program" if controller.pause() else _failed("pause"),
             "play": lambda: "Starting program" if controller.play() else _failed("play"),
             "unlock protective stop": self._unlock,
+            **({} if controller.config.is_cb3 else {"is in remote control": lambda: "true"}),
             "power on": lambda: self._power(RobotMode.IDLE, "Powering on"),
             "brake release": lambda: self._power(RobotMode.RUNNING, "Brake releasing"),
             "power off": lambda: self._power(RobotMode.POWER_OFF, "Powering off"),

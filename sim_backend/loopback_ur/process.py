@@ -31,6 +31,14 @@ class LoopbackControl:
         """End lasting faults and release the emergency button."""
         self._ask({"do": "clear"})
 
+    def slider(self, fraction: float) -> None:
+        """Move the pendant's speed slider."""
+        self._ask({"slider": fraction})
+
+    def tcp(self, pose: tuple[float, ...]) -> None:
+        """Choose another tool centre point (x, y, z, rx, ry, rz) at the pendant."""
+        self._ask({"tcp": list(pose)})
+
     def motion(self, since_s: float = 0.0) -> FloatArray:
         """Rows (t_s, q (6), qd (6)), every 2 ms since an instant of the monotonic clock."""
         rows = self._ask({"get": "motion", "since_s": since_s})["motion"]
@@ -69,6 +77,7 @@ class LoopbackProcess:
         unlock_after_s: float = 5.0,
         tcp_offset: tuple[float, ...] = (0.0,) * 6,
         q_start: tuple[float, ...] | None = None,
+        version: str | None = None,
     ) -> None:
         self.host = host
         command = [sys.executable, "-m", "sim_backend.loopback_ur", "--host", host]
@@ -76,6 +85,8 @@ class LoopbackProcess:
         command += ["--end-with-stdin", f"--tcp-offset={_comma(tcp_offset)}"]
         if q_start is not None:
             command += [f"--q-start={_comma(q_start)}"]
+        if version is not None:
+            command += ["--version", version]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
@@ -85,6 +96,11 @@ class LoopbackProcess:
             self.close()
             raise OSError(f"the loopback controller did not start: {said}")
         self.control = LoopbackControl(host)
+
+    @property
+    def pid(self) -> int:
+        """The controller's process id."""
+        return self._process.pid
 
     def close(self) -> None:
         """End the process; harmless when repeated."""

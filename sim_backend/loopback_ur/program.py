@@ -108,7 +108,7 @@ class ControlProgram:
                 # A pose without inverse kinematics ends a real program with an error.
                 self.ended = True
                 return
-            reach = float(np.linalg.norm(pose[:3, 3] - self._motion.T_base_tool[:3, 3]))
+            reach = float(np.linalg.norm(pose[:3, 3] - self._motion.actual()[0][:3, 3]))
             turn = float(np.abs(goal - self._motion.q).max())
             factor = turn / reach if reach > 1e-6 else 1.0
             speed, acceleration = min(speed * factor, math.pi), min(acceleration * factor, 40.0)

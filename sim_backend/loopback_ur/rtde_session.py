@@ -6,6 +6,7 @@ belongs to the first connection that asked for it until that one closes.
 
 import math
 import struct
+from enum import IntEnum
 
 from drivers.ur.rtde_codec import (
     FrameBuffer,
@@ -17,11 +18,21 @@ from drivers.ur.rtde_codec import (
     encode,
     split_names,
 )
-from sim_backend.loopback_ur.controller import Controller, zero_of
-from sim_backend.loopback_ur.variables import INPUTS, OUTPUTS
+from sim_backend.loopback_ur.controller import Controller
+from sim_backend.loopback_ur.variables import INPUTS, OUTPUTS, outputs_of, zero_of
 
-_RATE_HZ = 500.0
 _KNOWN_VERSIONS = (1, 2)
+_SOURCE = b"loopback controller"
+_LONGEST_TEXT = 255
+
+
+class Level(IntEnum):
+    """How bad a text message is."""
+
+    EXCEPTION = 0
+    ERROR = 1
+    WARNING = 2
+    INFO = 3
 
 
 class RtdeSession:
@@ -32,6 +43,7 @@ class RtdeSession:
         self._owners = owners  # of input names, shared by all connections
         self._buffer = FrameBuffer()
         self._version = 1
+        self._known_outputs = outputs_of(controller.config.version)
         self._outputs: tuple[str, ...] = ()
         self._output_recipe: Recipe | None = None
         self._divider = 1
@@ -45,12 +57,29 @@ class RtdeSession:
         """
         return b"".join(self._answer(message) for message in self._buffer.feed(data))
 
+    @property
+    def due(self) -> bool:
+        """Whether the client is to get this cycle's data."""
+        return self.started and self._controller.cycle % self._divider == 0
+
+    def text_frame(self, text: str, level: Level) -> bytes:
+        """A text message; empty while the client is being set up, when it expects none."""
+        if not self.started:
+            return b""
+        words = text.encode()[:_LONGEST_TEXT]
+        if self._version < 2:
+            return encode(Kind.TEXT, bytes([level]) + words)
+        message = bytes([len(words)]) + words + bytes([len(_SOURCE)]) + _SOURCE
+        return encode(Kind.TEXT, message + bytes([level]))
+
     def data_frame(self, outputs: dict[str, Value]) -> bytes:
         """This cycle's data for the client; empty when it wants none now."""
         recipe = self._output_recipe
-        if not self.started or recipe is None or self._controller.cycle % self._divider:
+        if recipe is None or not self.due:
             return b""
-        values = [outputs[name] if name in outputs else zero_of(name) for name in self._outputs]
+        values = [
+            outputs[name] if name in outputs else zero_of(OUTPUTS[name]) for name in self._outputs
+        ]
         prefix = b"\x01" if self._version >= 2 else b""
         return encode(Kind.DATA, prefix + recipe.pack(values))
 
@@ -94,19 +123,21 @@ class RtdeSession:
         return encode(Kind.PROTOCOL_VERSION, bytes([accepted]))
 
     def _setup_outputs(self, payload: bytes) -> bytes:
-        rate_hz = _RATE_HZ
+        most_hz = rate_hz = self._controller.config.rate_hz
         if self._version >= 2:
             if len(payload) < 8:
                 raise RtdeError("an output set-up of protocol 2 starts with a frequency")
             rate_hz = struct.unpack(">d", payload[:8])[0]
             payload = payload[8:]
         names = split_names(payload)
-        types = [OUTPUTS.get(name, "NOT_FOUND") for name in names]
+        types = [self._known_outputs.get(name, "NOT_FOUND") for name in names]
         valid = bool(names) and "NOT_FOUND" not in types
-        valid = valid and math.isfinite(rate_hz) and 0.0 < rate_hz <= _RATE_HZ
+        valid = valid and math.isfinite(rate_hz) and 0.0 < rate_hz <= most_hz
+        self.started = False
         self._outputs = tuple(names)
         self._output_recipe = Recipe(types) if valid else None
-        self._divider = max(1, round(_RATE_HZ / rate_hz)) if valid else 1
+        ticks = max(1, round(most_hz / rate_hz)) if valid else 1
+        self._divider = ticks * self._controller.config.cycles_per_tick
         prefix = bytes([valid]) if self._version >= 2 else b""
         return encode(Kind.SETUP_OUTPUTS, prefix + ",".join(types).encode())
 

@@ -13,13 +13,14 @@ import numpy as np
 from drivers.clock import Clock, WallClock
 from drivers.ur.rtde_codec import RtdeError, Value
 from sim_backend.history import JointHistory
+from sim_backend.loopback_ur.config import ControllerConfig
 from sim_backend.loopback_ur.connection import Connection, LineSession, ScriptSession, Session
 from sim_backend.loopback_ur.control_port import ControlPort
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.dashboard import BANNER, Dashboard
 from sim_backend.loopback_ur.faults import Faults
 from sim_backend.loopback_ur.motion import STEP_S
-from sim_backend.loopback_ur.rtde_session import RtdeSession
+from sim_backend.loopback_ur.rtde_session import Level, RtdeSession
 from sim_backend.loopback_ur.truth import ArmTruth
 
 RTDE_PORT, SCRIPT_PORT, DASHBOARD_PORT = 30004, 30003, 29999
@@ -27,6 +28,7 @@ RTDE_PORT, SCRIPT_PORT, DASHBOARD_PORT = 30004, 30003, 29999
 CONTROL_PORT = 29990
 # Later than this, what waits on the sockets is read before the missed cycles are made up for.
 _LATE_CYCLES = 4
+_MOST_CLIENTS = 100
 # A host that slept longer than this does not get all its missed cycles at once.
 _MOST_LATE_CYCLES = 250
 
@@ -106,12 +108,17 @@ class LoopbackServer:
                     self._drop(client)
         if self.faults.stalled:
             return
+        texts = self.controller.take_texts()
         outputs: dict[str, Value] | None = None
         for client in list(self._clients.values()):
             session = client.session
-            if isinstance(session, RtdeSession) and session.started:
+            if not isinstance(session, RtdeSession) or not session.started:
+                continue
+            out = b"".join(session.text_frame(text, Level.ERROR) for text in texts)
+            if session.due:
                 outputs = self.controller.outputs() if outputs is None else outputs
-                self._send(client, session.data_frame(outputs))
+                out += session.data_frame(outputs)
+            self._send(client, out)
 
     def _wait(self, timeout_s: float) -> None:
         ports = {listener.fileno(): port for port, listener in self._listeners.items()}
@@ -123,8 +130,12 @@ class LoopbackServer:
                 self._receive(self._clients[number])
 
     def _accept(self, port: int) -> None:
-        accepted, _ = self._listeners[port].accept()
-        if self.faults.refusing and port != CONTROL_PORT:
+        try:
+            accepted, _ = self._listeners[port].accept()
+        except OSError:
+            return  # the client left again
+        refused = self.faults.refusing and port != CONTROL_PORT
+        if refused or len(self._clients) >= _MOST_CLIENTS:
             accepted.close()
             return
         client = Connection(accepted, port, self._session(port))
@@ -139,7 +150,7 @@ class LoopbackServer:
             return ScriptSession(self.controller)
         if port == DASHBOARD_PORT:
             return LineSession(Dashboard(self.controller).answer)
-        return LineSession(ControlPort(self.faults, self.truth).answer)
+        return LineSession(ControlPort(self.controller, self.faults, self.truth).answer)
 
     def _receive(self, client: Connection) -> None:
         try:
@@ -179,6 +190,7 @@ def _listen(host: str, port: int) -> socket.socket:
     try:
         listener.bind((host, port))
         listener.listen(8)
+        listener.setblocking(False)
     except OSError as error:
         listener.close()
         raise OSError(f"cannot listen on {host}:{port}: {error}") from error

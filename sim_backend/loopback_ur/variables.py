@@ -1,5 +1,7 @@
 """The names and types that RTDE offers; source: Universal Robots' RTDE guide."""
 
+from drivers.ur.rtde_codec import Value
+
 _SIX_DOUBLES = (
     "target_q target_qd target_qdd target_current target_moment actual_q actual_qd actual_current "
     "joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose "
@@ -33,6 +35,30 @@ OUTPUTS: dict[str, str] = {
     **{f"output_double_register_{i}": "DOUBLE" for i in range(48)},
 }
 
+# Outputs that came with a version: of CB3 controllers, of e-Series controllers (None: never).
+# Sources: the guide; for ``tcp_offset``, which it does not list, the notes of Universal Robots'
+# own client library. What else is older or newer is not told apart.
+_SINCE: dict[str, tuple[tuple[int, ...] | None, tuple[int, ...]]] = {
+    "tcp_offset": ((3, 12), (5, 5, 1)),
+    "safety_status": ((3, 10), (5, 4)),
+    "payload": ((3, 11), (5, 5, 1)),
+    "payload_cog": ((3, 11), (5, 5, 1)),
+    "payload_inertia": ((3, 15), (5, 11)),
+    "ft_raw_wrench": (None, (5, 9)),
+}
+_CB3 = 3
+
+
+def outputs_of(version: tuple[int, ...]) -> dict[str, str]:
+    """Names and types of the outputs that a controller of ``version`` knows."""
+    known = dict(OUTPUTS)
+    for name, (cb3, e_series) in _SINCE.items():
+        since = cb3 if version[0] <= _CB3 else e_series
+        if since is None or version < since:
+            del known[name]
+    return known
+
+
 INPUTS: dict[str, str] = {
     "speed_slider_mask": "UINT32",
     "speed_slider_fraction": "DOUBLE",
@@ -53,3 +79,14 @@ INPUTS: dict[str, str] = {
     **{f"input_int_register_{i}": "INT32" for i in range(48)},
     **{f"input_double_register_{i}": "DOUBLE" for i in range(48)},
 }
+
+_ZERO_OF: dict[str, Value] = {
+    "VECTOR3D": (0.0,) * 3,
+    "VECTOR6D": (0.0,) * 6,
+    "VECTOR6INT32": (0,) * 6,
+}
+
+
+def zero_of(kind: str) -> Value:
+    """The zero of a type."""
+    return _ZERO_OF.get(kind, 0)

@@ -13,7 +13,8 @@ from drivers.clock import WallClock
 from drivers.errors import ConnectError
 from drivers.ur.rtde_codec import FrameBuffer, Kind, RtdeError, encode
 from drivers.ur.rtde_stream import RTDE_PORT, RtdeStream
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.rtde_session import RtdeSession
 from tests.drivers.ur.loopback import free_host
 

@@ -3,41 +3,12 @@
 import numpy as np
 import pytest
 
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.faults import Faults, fault_kind
 from sim_backend.loopback_ur.motion import STEP_S
 from sim_backend.loopback_ur.safety import RobotMode, RuntimeState, SafetyMode
-
-SCRIPT = "def x():\n  read_input_integer_reg(0)\nend\n"
-
-
-class Bench:
-    """A controller that runs the control program, with a hand on its registers."""
-
-    def __init__(self, **config):
-        self.controller = Controller(ControllerConfig(**config))
-        self.controller.start_program(SCRIPT)
-
-    def command(self, code, *doubles, integer=0):
-        values = {f"input_double_register_{i}": x for i, x in enumerate(doubles)}
-        values |= {"input_int_register_1": integer, "input_int_register_0": code}
-        self.controller.write_inputs(values)
-
-    def run(self, seconds, feed=True):
-        """Run; with ``feed`` the last command is repeated each cycle."""
-        for _ in range(round(seconds / STEP_S)):
-            if feed:
-                last = self.controller.inputs["input_int_register_0"]
-                self.controller.write_inputs({"input_int_register_0": last})
-            self.controller.step()
-
-    @property
-    def state(self):
-        return self.controller.outputs()["output_int_register_0"]
-
-    @property
-    def speed(self):
-        return float(np.abs(self.controller.motion.twist_base()).max())
+from tests.sim_backend.loopback_ur.bench import SCRIPT, Bench
 
 
 def moving(**config):
@@ -222,3 +193,13 @@ def test_lasting_faults_end_after_their_time():
         faults.step()
         seen.append(faults.stalled)
     assert sum(seen) == 10 and not seen[3] and seen[5] and not seen[-1]
+
+
+def test_a_cb3_looks_at_its_registers_every_8_ms():
+    bench = Bench(version=(3, 15, 8, 0))
+    bench.run(0.008)
+    bench.command(10, 0.05, 0, 0, 0, 0, 0, 2.0, 0.008)
+    bench.run(0.006)
+    assert bench.speed == 0.0
+    bench.run(0.3)
+    assert bench.speed == pytest.approx(0.05, abs=1e-3)

@@ -1,17 +1,11 @@
-"""The arm's kinematics held against a MuJoCo model built from the same published parameters."""
-
-import math
+"""The arm's kinematics; ``test_arm_model`` holds pose and Jacobian against MuJoCo's."""
 
 import numpy as np
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from sim_backend.loopback_ur.kinematics import (
-    A_M,
-    ALPHA_RAD,
-    D_M,
     HOME_Q,
     joint_rates,
     joints_for,
@@ -20,38 +14,8 @@ from sim_backend.loopback_ur.kinematics import (
     tool_pose,
     transform,
 )
-from sim_backend.mujoco_import import load_mujoco
 
 T_FLANGE_TOOL = transform((0.02, -0.03, 0.12, 0.3, -0.2, 0.1))
-
-
-def mujoco_model():
-    """Six hinges about z, each followed by its link's fixed offset along z and x and twist."""
-    inner, place = "", 'pos="0 0 0"'
-    for i in range(6):
-        inner += f'<body {place}><joint axis="0 0 1"/><geom size="0.01" mass="1"/>'
-        half = ALPHA_RAD[i] / 2
-        place = f'pos="{A_M[i]} 0 {D_M[i]}" quat="{math.cos(half)} {math.sin(half)} 0 0"'
-    q = Rotation.from_matrix(T_FLANGE_TOOL[:3, :3]).as_quat(scalar_first=True)
-    p = T_FLANGE_TOOL[:3, 3]
-    inner += f'<body {place}><site name="tool" pos="{p[0]} {p[1]} {p[2]}" '
-    inner += f'quat="{q[0]} {q[1]} {q[2]} {q[3]}"/></body>' + "</body>" * 6
-    return load_mujoco().MjModel.from_xml_string(f"<mujoco><worldbody>{inner}</worldbody></mujoco>")
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_pose_and_jacobian_are_mujocos(seed):
-    mujoco, model = load_mujoco(), mujoco_model()
-    data = mujoco.MjData(model)
-    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, 6)
-    data.qpos[:] = q
-    mujoco.mj_forward(model, data)
-    linear, angular = np.zeros((3, 6)), np.zeros((3, 6))
-    mujoco.mj_jacSite(model, data, linear, angular, 0)
-    T, J = pose_and_jacobian(q, T_FLANGE_TOOL)
-    assert np.allclose(T[:3, 3], data.site("tool").xpos, atol=1e-9)
-    assert np.allclose(T[:3, :3], data.site("tool").xmat.reshape(3, 3), atol=1e-9)
-    assert np.allclose(J, np.vstack([linear, angular]), atol=1e-9)
 
 
 def test_at_home_the_tool_points_down():

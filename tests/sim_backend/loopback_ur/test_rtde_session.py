@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.ur.rtde_codec import FrameBuffer, Kind, RtdeError, encode
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.rtde_session import RtdeSession
 
 KINDS = st.sampled_from([*[int(kind) for kind in Kind], 0, 255])
@@ -79,6 +80,33 @@ def test_an_unknown_output_is_not_found_and_cannot_be_started():
     reply = client.ask(Kind.SETUP_OUTPUTS, outputs(500.0, b"timestamp,nonsense"))
     assert reply == b"\x00DOUBLE,NOT_FOUND"
     assert client.ask(Kind.START) == b"\x00"
+
+
+def of_version(*version):
+    return Client(Controller(ControllerConfig(version=version)))
+
+
+def test_a_cb3_reports_at_125_hz_and_no_faster():
+    client = of_version(3, 15, 8, 0)
+    assert client.ask(Kind.SETUP_OUTPUTS, outputs(500.0, b"timestamp"))[:1] == b"\x00"
+    assert client.ask(Kind.SETUP_OUTPUTS, outputs(125.0, b"timestamp"))[:1] == b"\x01"
+    client.ask(Kind.START)
+    stamps = []
+    for _ in range(40):
+        client.controller.step()
+        payload = client.data()
+        stamps += [] if payload is None else [struct.unpack(">d", payload[1:])[0]]
+    assert len(stamps) == 10
+    assert stamps[1] - stamps[0] == pytest.approx(0.008, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("version", "known"),
+    [((3, 7, 0, 0), False), ((3, 12, 0, 0), True), ((5, 5, 0, 0), False), ((5, 5, 1, 0), True)],
+)
+def test_what_came_with_a_later_version_is_not_found(version, known):
+    reply = of_version(*version).ask(Kind.SETUP_OUTPUTS, outputs(125.0, b"tcp_offset"))
+    assert reply == (b"\x01VECTOR6D" if known else b"\x00NOT_FOUND")
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0, 501.0, float("nan"), float("inf")])

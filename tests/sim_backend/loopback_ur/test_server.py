@@ -1,18 +1,16 @@
-"""The controller on its sockets: a plain protocol 1 client, faults, and the end of its process."""
+"""The controller on its sockets: real time, faults, rude clients, and the end of its process."""
 
-import contextlib
 import socket
-import struct
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from drivers.clock import WallClock
-from drivers.ur.rtde_codec import FrameBuffer, Kind, encode
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
-from sim_backend.loopback_ur.server import DASHBOARD_PORT, RTDE_PORT
+from sim_backend.loopback_ur.server import DASHBOARD_PORT
 from tests.drivers.ur.loopback import start_loopback
+from tests.sim_backend.loopback_ur.plain_client import PlainClient
 
 CLOCK = WallClock()
 
@@ -23,39 +21,17 @@ def loopback() -> Iterator[LoopbackProcess]:
         yield process
 
 
-class PlainClient:
-    """RTDE protocol 1, as any client might speak it."""
-
-    def __init__(self, host):
-        self.socket = socket.create_connection((host, RTDE_PORT), 5.0)
-        self.buffer = FrameBuffer()
-        self.held = []
-
-    def send(self, kind, payload=b""):
-        self.socket.sendall(encode(kind, payload))
-
-    def receive(self):
-        while not self.held:
-            data = self.socket.recv(65536)
-            if not data:
-                raise ConnectionError("closed")
-            self.held += self.buffer.feed(data)
-        return self.held.pop(0)
-
-
 @pytest.fixture
 def client(loopback):
-    plain = PlainClient(loopback.host)
-    plain.send(Kind.SETUP_OUTPUTS, b"timestamp,actual_q")
-    assert plain.receive().payload == b"DOUBLE,VECTOR6D"
-    plain.send(Kind.START)
-    assert plain.receive().payload == b"\x01"
+    plain = PlainClient(loopback.host, protocol=1)
+    assert plain.outputs("timestamp,actual_q") == ["DOUBLE", "VECTOR6D"]
+    assert plain.start()
     yield plain
-    plain.socket.close()
+    plain.close()
 
 
 def stamps(client, count):
-    return np.array([struct.unpack(">7d", client.receive().payload)[0] for _ in range(count)])
+    return np.array([client.data()[0] for _ in range(count)])
 
 
 def test_data_comes_every_2_ms_of_controller_time_and_in_real_time(client):
@@ -81,22 +57,10 @@ def test_a_drop_closes_and_refuses_for_its_time(client, loopback):
     with pytest.raises(ConnectionError):
         while True:
             client.receive()
-    with pytest.raises(OSError, match=r"closed|reset"):
-        refused = PlainClient(loopback.host)
-        with contextlib.closing(refused.socket):
-            refused.send(Kind.START)
-            refused.receive()
+    with pytest.raises(OSError, match=r"hung up|reset"):
+        PlainClient(loopback.host)
     CLOCK.sleep_until(CLOCK.now_s() + 0.5)
-    PlainClient(loopback.host).socket.close()
-
-
-def test_a_client_that_talks_nonsense_is_hung_up_on(loopback, client):
-    with contextlib.closing(PlainClient(loopback.host).socket) as rude:
-        rude.settimeout(5.0)
-        rude.sendall(b"\x00\x00garbage")
-        with contextlib.suppress(ConnectionResetError):
-            assert rude.recv(1) == b""
-    assert len(stamps(client, 10)) == 10  # the others do not notice
+    PlainClient(loopback.host).close()
 
 
 def test_the_dashboard_greets_and_answers(loopback):
@@ -115,6 +79,23 @@ def test_the_truth_is_on_the_hosts_clock(loopback):
     assert rows.shape[1] == 13
     assert np.allclose(np.diff(rows[:, 0]), 0.002)
     assert abs(rows[-1, 0] - now_s) < 1.0
+
+
+def test_the_pendant_can_change_the_tool_and_nonsense_is_explained(loopback):
+    watcher = PlainClient(loopback.host)
+    watcher.outputs("tcp_offset")
+    assert watcher.start()
+    loopback.control.tcp((0.0, 0.01, 0.12, 0.0, 0.0, 0.3))
+    while watcher.data()[2] == 0.0:
+        pass
+    assert watcher.data() == pytest.approx((0.0, 0.01, 0.12, 0.0, 0.0, 0.3))
+    loopback.control.tcp((0.0,) * 6)
+    watcher.close()
+    for nonsense in ((1.0,), (float("nan"),) * 6):
+        with pytest.raises(ValueError, match="six numbers"):
+            loopback.control.tcp(nonsense)
+    with pytest.raises(ValueError, match="from 0 to 1"):
+        loopback.control.slider(1.5)
 
 
 def test_wrong_requests_for_truth_are_explained(loopback):

@@ -5,7 +5,8 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.dashboard import Dashboard
 from sim_backend.loopback_ur.safety import RobotMode
 from sim_backend.loopback_ur.script_port import ScriptPort
@@ -26,6 +27,11 @@ def test_it_says_what_the_vendor_client_looks_for():
     assert dashboard.answer("is in remote control") == "true"
     assert dashboard.answer("running") == "Program running: true"
     assert dashboard.answer("programState").startswith("PLAYING")
+
+
+def test_a_cb3_does_not_know_remote_control():
+    dashboard = Dashboard(Controller(ControllerConfig(version=(3, 15, 8, 0))))
+    assert dashboard.answer("is in remote control").startswith("could not understand")
 
 
 def test_stop_pause_and_play_act_on_the_program():

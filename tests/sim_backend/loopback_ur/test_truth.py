@@ -10,7 +10,8 @@ from drivers.clock import WallClock
 from sim_backend.clock import SimulatedClock
 from sim_backend.history import JointHistory
 from sim_backend.loopback_rig.remote import RemoteMotion
-from sim_backend.loopback_ur.controller import Controller, ControllerConfig
+from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.kinematics import HOME_Q, tool_pose, transform
 from sim_backend.loopback_ur.motion import STEP_S
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
