@@ -1,0 +1,96 @@
+"""Which calibration a run uses: the file of `rig calibrate`, given values, or nominal ones."""
+
+from pathlib import Path
+
+from drivers.errors import ConfigError
+from rig.calibration.result import CalibrationFile, Fingerprints, fingerprint, load_calibration
+from rig.calibration.result_check import check_usable
+from rig.config import RigConfig
+from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
+from sim_backend.config import SimConfig
+
+
+def calibration_path(config: RigConfig) -> Path:
+    """Where the rig's calibration is, or will be."""
+    return Path(config.calibration.file or f"calibration/{config.name}.yaml")
+
+
+def fingerprints(config: RigConfig) -> Fingerprints:
+    """What a calibration depends on, as the configuration has it."""
+    camera = config.camera.model_dump(mode="json", exclude={"method"})
+    arm = config.arm.model_dump(mode="json", exclude={"host", "port", "hold_s"})
+    tcp = arm.pop("tcp_offset", None)
+    out = {
+        "camera": fingerprint(camera),
+        "arm": fingerprint(arm),
+        "board": fingerprint(config.calibration.board.model_dump(mode="json")),
+    }
+    return out if tcp is None else {**out, "tcp": fingerprint(tcp)}
+
+
+def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig, str]:
+    """The configuration with the geometry to use, and where that is from, in words.
+
+    The calibration's file goes before given values; without either the device's own factory
+    values hold. Raises ConfigError for a file that is named but missing, failed or out of date.
+    """
+    if uncalibrated:
+        return with_nominal(config), "nominal values (--uncalibrated)"
+    path = calibration_path(config)
+    if config.calibration.file is None and not path.exists():
+        given = config.calibration.intrinsics is not None
+        return config, "given in the rig file" if given else "the device's own"
+    found = load_calibration(path)
+    if found.rig != config.name:
+        raise ConfigError(f"{path} is the calibration of the rig {found.rig}, not {config.name}")
+    # The board only matters for calibrating: another one in the configuration changes nothing.
+    now = {key: value for key, value in fingerprints(config).items() if key != "board"}
+    check_usable(found, now, path)
+    return _with_values(config, found), str(path)
+
+
+def with_nominal(config: RigConfig) -> RigConfig:
+    """The configuration with what is known without a calibration; simulated: its drawings."""
+    if config.camera.driver != "sim" or config.arm.driver != "sim":
+        return config
+    drawn, camera, given = SimConfig(), config.sim.camera, config.calibration
+    values: dict[str, object] = {}
+    if given.intrinsics is None:
+        values["intrinsics"] = IntrinsicsConfig(
+            fx_px=drawn.camera.focal_px,
+            fy_px=drawn.camera.focal_px,
+            cx_px=0.5 * (camera.width - 1),
+            cy_px=0.5 * (camera.height - 1),
+        )
+    if given.tool_camera_xyz_m is None:
+        values["tool_camera_xyz_m"] = drawn.T_tool_camera[:3]
+        values["tool_camera_rotvec_rad"] = drawn.T_tool_camera[3:]
+    return _replaced(config, values)
+
+
+def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
+    """``config`` with the file's values; the check before has made sure that they are there."""
+    lens, hand_eye, latency = found.intrinsics, found.hand_eye, found.latency
+    assert lens is not None
+    assert hand_eye is not None
+    assert latency is not None
+    return _replaced(
+        config,
+        {
+            "intrinsics": IntrinsicsConfig(
+                fx_px=lens.fx_px,
+                fy_px=lens.fy_px,
+                cx_px=lens.cx_px,
+                cy_px=lens.cy_px,
+                distortion=lens.distortion,
+            ),
+            "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
+            "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
+            "latency_s": latency.latency_s,
+        },
+    )
+
+
+def _replaced(config: RigConfig, values: dict[str, object]) -> RigConfig:
+    data = {**config.calibration.model_dump(), **values}
+    return config.model_copy(update={"calibration": CalibrationConfig.model_validate(data)})

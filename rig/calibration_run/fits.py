@@ -1,0 +1,81 @@
+"""From what was collected to numbers: intrinsics and hand-eye together, latency, verification."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.calibration.board import BoardConfig
+from rig.calibration.errors import CalibrationError
+from rig.calibration.hand_eye import HandEyeFit, HandEyeSettings, solve_hand_eye
+from rig.calibration.hand_eye_held_out import HeldOutError, held_out_error
+from rig.calibration.hand_eye_model import State
+from rig.calibration.intrinsics import IntrinsicsFit, fit_intrinsics
+from rig.calibration.latency import LatencyFit, fit_latency
+from rig.calibration.projection import to_vector
+from rig.calibration.wiggle import Wiggle, WiggleVerdict, judge_wiggles
+from rig.calibration_run.recording import Recording
+from rig.calibration_run.stills import Still
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """The camera and where it sits on the tool."""
+
+    lens: IntrinsicsFit
+    hand_eye: HandEyeFit
+
+    @property
+    def state(self) -> State:
+        """The fitted values, as the other steps take them."""
+        fit = self.hand_eye
+        return State(fit.T_tool_camera, fit.T_base_board, to_vector(fit.intrinsics))
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What fresh poses and small motions say about a calibration."""
+
+    error: HeldOutError
+    wiggles: WiggleVerdict
+
+
+def fit_lens(stills: Sequence[Still]) -> IntrinsicsFit:
+    """Intrinsics from images alone; raises CalibrationError with the views that are missing."""
+    if not stills:
+        raise CalibrationError("no image shows the board: there is nothing to fit")
+    height, width = stills[0].image.shape[:2]
+    return fit_intrinsics([still.view.board for still in stills], (width, height))
+
+
+def fit_geometry(
+    stills: Sequence[Still], board: BoardConfig, settings: HandEyeSettings
+) -> Geometry:
+    """Intrinsics and hand-eye from stills with arm poses; raises CalibrationError."""
+    lens = fit_lens(stills)
+    hand_eye = solve_hand_eye(
+        [still.view for still in stills], lens.intrinsics, lens.model, board.square_m, settings
+    )
+    return Geometry(lens, hand_eye)
+
+
+def fit_delay(recording: Recording, geometry: Geometry) -> LatencyFit:
+    """How late the stamps are; raises CalibrationError when segments disagree or are weak."""
+    return fit_latency(
+        recording.segments,
+        recording.trajectory(),
+        geometry.state,
+        geometry.hand_eye.covariance,
+        recording.height,
+    )
+
+
+def verify(stills: Sequence[Still], wiggles: Sequence[Wiggle], geometry: Geometry) -> Verification:
+    """Judge a calibration by poses and motions that it was not fitted to."""
+    state = geometry.state
+    error = held_out_error([still.view for still in stills], state)
+    fit = geometry.hand_eye
+    return Verification(error, judge_wiggles(wiggles, fit.T_tool_camera, fit.intrinsics))

@@ -1,0 +1,203 @@
+"""``rig calibrate``: intrinsics, hand-eye, latency, verification; and the board to print."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from rich.console import Console
+
+from rig.commands.options import AsJson, Assignments, RigFile, Seed, warn
+from rig.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rig.calibration.result import CalibrationFile
+    from rig.calibration_run.session import Session
+    from rig.config import RigConfig
+
+calibrate_app = typer.Typer(
+    help="Find the camera's intrinsics, its place on the tool and the latency of its images; "
+    "without a step: all of them, in order, and a verdict.",
+    invoke_without_command=True,
+)
+
+Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
+Realtime = Annotated[
+    bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with what an interrupted calibration collected.")
+]
+
+
+@calibrate_app.callback()
+def calibrate(
+    context: typer.Context,
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    resume: Resume = False,
+    realtime: Realtime = False,
+    as_json: AsJson = False,
+) -> None:
+    """Calibrate everything, in order: intrinsics, hand-eye, latency, verification."""
+    if context.invoked_subcommand is None:
+        _run("all", rig, assignments, seed, resume, realtime, as_json)
+
+
+@calibrate_app.command()
+def intrinsics(
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    resume: Resume = False,
+    realtime: Realtime = False,
+    as_json: AsJson = False,
+) -> None:
+    """Look at the board from many poses; intrinsics and hand-eye are fitted together."""
+    _run("intrinsics", rig, assignments, seed, resume, realtime, as_json)
+
+
+@calibrate_app.command("hand-eye")
+def hand_eye(
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    resume: Resume = False,
+    realtime: Realtime = False,
+    as_json: AsJson = False,
+) -> None:
+    """Look at the board from many poses; intrinsics and hand-eye are fitted together."""
+    _run("hand-eye", rig, assignments, seed, resume, realtime, as_json)
+
+
+@calibrate_app.command()
+def latency(
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    realtime: Realtime = False,
+    as_json: AsJson = False,
+) -> None:
+    """Wiggle in front of the board, on what the hand-eye step collected."""
+    _run("latency", rig, assignments, seed, True, realtime, as_json)
+
+
+@calibrate_app.command()
+def verify(
+    rig: RigFile = None,
+    assignments: Assignments = None,
+    seed: Seed = None,
+    realtime: Realtime = False,
+    as_json: AsJson = False,
+) -> None:
+    """Check the calibration with small motions and fresh poses."""
+    _run("verify", rig, assignments, seed, True, realtime, as_json)
+
+
+@calibrate_app.command()
+def board(
+    squares: Annotated[str, typer.Option(help="Squares in a row x in a column.")] = "7x5",
+    square: Annotated[float, typer.Option(help="Side of a square, m.")] = 0.03,
+    marker: Annotated[float, typer.Option(help="Side of a marker, m.")] = 0.022,
+    dictionary: Annotated[str, typer.Option(help="OpenCV's name of the markers.")] = "DICT_4X4_50",
+    paper: Annotated[
+        Literal["a4", "a3", "letter"], typer.Option(help="The paper to print on.")
+    ] = "a4",
+    out: Annotated[Path, typer.Option(help="The PDF to write.")] = Path("board.pdf"),
+) -> None:
+    """Write the board as a PDF to print at 100 %, and its definition for the rig file."""
+    from pydantic import ValidationError
+
+    from drivers.errors import ConfigError
+    from rig.calibration.board import BoardConfig
+    from rig.calibration.board_pdf import board_pdf, definition
+
+    columns, _, rows = squares.partition("x")
+    if not (columns.isdigit() and rows.isdigit()):
+        raise ConfigError(f"--squares {squares}: two numbers like 7x5 are needed")
+    try:
+        config = BoardConfig(
+            squares=(int(columns), int(rows)),
+            square_m=square,
+            marker_m=marker,
+            dictionary=dictionary,
+        )
+    except ValidationError as error:
+        raise ConfigError(f"this board cannot be: {error.errors()[0]['msg']}") from error
+    try:
+        out.write_bytes(board_pdf(config, paper))
+    except OSError as error:
+        raise ConfigError(f"cannot write {out}: {error}") from error
+    warn(f"{out}: print it at 100 %, measure the ruler, then put this into the rig file:")
+    print(definition(config), end="")
+
+
+def _run(
+    step: Step,
+    rig: Path | None,
+    assignments: list[str] | None,
+    seed: int | None,
+    resume: bool,
+    realtime: bool,
+    as_json: bool,
+) -> None:
+    from drivers.clock import WallClock
+    from rig.calibrated import calibration_path, fingerprints, with_nominal
+    from rig.calibration.result import CalibrationFile, load_calibration
+    from rig.calibration_run.bench import open_bench
+    from rig.calibration_run.progress import ConsoleProgress
+    from rig.calibration_run.session import Session
+    from rig.calibration_run.store import Store
+    from rig.calibration_run.summary import json_of, table
+    from rig.config_load import load_config
+    from rig.stop_request import StopRequest
+
+    extra = [*(assignments or []), *([] if seed is None else [f"sim.seed={seed}"])]
+    config = with_nominal(load_config("sphere", rig, extra))
+    path, depends_on = calibration_path(config), fingerprints(config)
+    console = Console(stderr=True)
+    store = Store(path.with_name(f"{config.name}-data"), depends_on, resume)
+    before: CalibrationFile | None = None
+    if step != "all" and path.exists():
+        before = load_calibration(path)
+    wall = WallClock()
+    start_s = wall.now_s()
+    with StopRequest() as stop_requested, open_bench(config, realtime) as bench:
+        session = Session(
+            config,
+            bench,
+            store,
+            path,
+            before,
+            depends_on,
+            ConsoleProgress(console),
+            stop_requested,
+        )
+        found = _steps(session, step)
+    summary = json_of(session, found, path, wall.now_s() - start_s)
+    if as_json:
+        print(json.dumps(summary), flush=True)
+    console.print(table(summary))
+    _finish(found, config, path)
+
+
+def _steps(session: "Session", step: Step) -> "CalibrationFile":
+    """The step asked for, on what those before it left; then the verdict."""
+    if step in ("all", "intrinsics", "hand-eye"):
+        session.collect()
+        session.fit()
+    if step in ("all", "latency"):
+        session.measure_latency()
+    if step in ("all", "verify"):
+        session.check()
+    return session.conclude()
+
+
+def _finish(found: "CalibrationFile", config: "RigConfig", path: Path) -> None:
+    verdict = found.verdict
+    if verdict is not None and not verdict.passed:
+        for reason in verdict.reasons:
+            warn(f"not usable yet: {reason}")
+        raise typer.Exit(ExitCode.CALIBRATION)
+    warn(f"{path}: `rig run` uses it from here on")
