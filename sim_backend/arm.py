@@ -4,14 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import OperateError
-from drivers.interfaces import ArmState
+from drivers.interfaces import ArmState, Joints
 from sim_backend.config import ArmConfig
 from sim_backend.jit import jit
-from sim_backend.kinematics import tool_pose, tool_twist
+from sim_backend.kinematics import JOINT_HIGH, JOINT_LOW, tool_jacobian, tool_pose, tool_twist
 from sim_backend.world import World
 
 FloatArray = NDArray[np.float64]
 
+_JOINT_NAMES = ("x", "y", "z", "roll", "pitch", "spin")
+_LINEAR = (True, True, True, False, False, False)
 _STEPS_PER_SAMPLE = 2  # of 1 ms: the controller reports at 500 Hz
 
 
@@ -26,6 +28,8 @@ class SimulatedArm:
         self._random = np.random.default_rng([seed, 1])
         self._next = 0  # number of the first sample not returned yet
         self._closed = False
+        self._q: FloatArray | None = None  # (6,) joints at the newest reported sample
+        tool_jacobian(np.zeros(6))
         # Compiles the kernels now rather than in the middle of a run.
         _measure(np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 6)), self._steps)
 
@@ -47,12 +51,19 @@ class SimulatedArm:
         kept = numbers >= history.first
         numbers, noise = numbers[kept], noise[kept]
         q, qd = history.entries(numbers)
+        self._q = q[-1]
         poses, twists = _measure(q, qd, noise, self._steps)
         times = history.start_s + numbers * history.step_s
         return [
             ArmState(t_s=float(t), T_base_tool=T, twist_tool=twist)
             for t, T, twist in zip(times, poses, twists, strict=True)
         ]
+
+    def joints(self) -> Joints | None:
+        """The joints at the newest reported sample; None before the first."""
+        if self._q is None:
+            return None
+        return Joints(_JOINT_NAMES, self._q, JOINT_LOW, JOINT_HIGH, _LINEAR, tool_jacobian)
 
     def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
         """Follow ``twist_tool`` (6,), held in the tool's own axes, for ``hold_s`` from now.

@@ -2,6 +2,7 @@
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from sim_backend.sensor import expose
 
 # Frames looked at in one go when searching for the newest; jitter never reorders further.
 _JITTER_LIMIT_SIGMAS = 3.0
+_FRAMES_REMEMBERED = 256
 
 
 class Timeline(Protocol):
@@ -38,8 +40,8 @@ class SimulatedCamera:
     A frame becomes readable ``latency_s`` plus jitter after its mid-exposure, but not before
     it is exposed and read out. With a rolling shutter a frame's instant is that of the middle
     row. Rendering happens in a thread of its own: a call of ``read`` that finds a frame exposed
-    but not readable yet has it rendered meanwhile, at most one ahead. What is returned, and
-    when, does not depend on that.
+    but not readable yet has it rendered meanwhile, one at a time. What is returned, and when,
+    does not depend on that.
     """
 
     def __init__(
@@ -66,7 +68,9 @@ class SimulatedCamera:
         self._last_seq = -1
         self._closed = False
         self._darkroom = ThreadPoolExecutor(1, thread_name_prefix="sim-camera")
-        self._ahead: tuple[int, Future[Frame]] | None = None
+        self._ahead: dict[int, Future[Frame]] = {}  # by number, all above the last returned
+        # Asked for every frame at every look; the answer costs two random numbers.
+        self._readable_s = lru_cache(maxsize=_FRAMES_REMEMBERED)(self._drawn_readable_s)
 
     def read(self, timeout_s: float) -> Frame | None:
         """The newest readable frame not returned before; see ``drivers.interfaces.Camera``."""
@@ -74,21 +78,22 @@ class SimulatedCamera:
             raise OperateError("simulated camera: read after close; build the rig again")
         clock = self._world.clock
         deadline_s = clock.now_s() + timeout_s
+        last_look = False
         while True:
             now_s = self._world.sync()
             seq = self._newest_readable(now_s)
             if seq is not None:
-                self._last_seq = seq
-                return self._taken(seq)
+                return self._taken(seq, now_s)
             self._take_ahead(now_s)
             next_s = self._next_readable_s()
-            if now_s >= deadline_s or next_s > deadline_s:
-                clock.sleep_until(deadline_s)
-                # A clock may wake late: look once more unless it is still too early.
-                if clock.now_s() < next_s:
-                    return None
-            else:
-                clock.sleep_until(next_s)
+            if last_look:
+                return None
+            clock.sleep_until(min(next_s, deadline_s))
+            # A clock may wake late: look once more unless it is still too early. Motion that is
+            # known late must not keep it here.
+            if clock.now_s() < next_s:
+                return None
+            last_look = clock.now_s() >= deadline_s
 
     def close(self) -> None:
         """Release the renderer; harmless when repeated."""
@@ -96,18 +101,25 @@ class SimulatedCamera:
         self._darkroom.shutdown()
         self._renderer.close()
 
+    def _taken(self, seq: int, now_s: float) -> Frame:
+        """Frame ``seq``; the next one is rendered while the caller works on it."""
+        frame = self._ahead.pop(seq, None) or self._darkroom.submit(self._take, seq)
+        self._last_seq = seq
+        for overtaken in [number for number in self._ahead if number < seq]:
+            self._ahead.pop(overtaken).cancel()
+        self._take_ahead(now_s)
+        return frame.result()
+
     def _take_ahead(self, now_s: float) -> None:
         """Begin with the newest frame that is exposed, unless another is being worked on."""
         seq = self._newest_exposed(now_s)
-        if self._ahead is not None and (self._ahead[0] >= seq or not self._ahead[1].done()):
+        if seq <= self._last_seq or seq in self._ahead or not self._idle():
             return
-        if seq > self._last_seq and self._readable_s(seq) < math.inf:
-            self._ahead = seq, self._darkroom.submit(self._take, seq)
+        if self._readable_s(seq) < math.inf:
+            self._ahead[seq] = self._darkroom.submit(self._take, seq)
 
-    def _taken(self, seq: int) -> Frame:
-        if self._ahead is not None and self._ahead[0] == seq:
-            return self._ahead[1].result()
-        return self._darkroom.submit(self._take, seq).result()
+    def _idle(self) -> bool:
+        return all(frame.done() for frame in self._ahead.values())
 
     def _take(self, seq: int) -> Frame:
         mid_s = self._mid_s(seq)
@@ -124,7 +136,7 @@ class SimulatedCamera:
     def _mid_s(self, seq: int) -> float:
         return self._first_s + seq * self._period_s
 
-    def _readable_s(self, seq: int) -> float:
+    def _drawn_readable_s(self, seq: int) -> float:
         """When frame ``seq`` can be read; never (infinity) if it is dropped."""
         c = self._config
         if c.latency_jitter_s == 0.0 and c.drop_probability == 0.0:

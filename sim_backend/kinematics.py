@@ -71,6 +71,18 @@ def tool_twist(q: FloatArray, qd: FloatArray) -> FloatArray:
 
 
 @jit
+def tool_jacobian(q: FloatArray) -> FloatArray:
+    """J (6, 6) with tool_twist(q, qd) = J @ qd."""
+    J = np.zeros((6, 6))
+    qd = np.zeros(6)
+    for i in range(6):
+        qd[i] = 1.0
+        J[:, i] = tool_twist(q, qd)
+        qd[i] = 0.0
+    return J
+
+
+@jit
 def joint_rates(q: FloatArray, twist_tool: FloatArray) -> FloatArray:
     """Joint velocities (6,) that give the tool ``twist_tool`` (6,) in its own axes.
 

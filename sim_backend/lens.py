@@ -1,5 +1,6 @@
 """The simulated camera's projection: pinhole, Brown-Conrady distortion, vignetting."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,16 +19,22 @@ class Lens:
 
     width: int
     height: int
-    focal_px: float
+    fx_px: float
+    fy_px: float
     cx_px: float
     cy_px: float
     distortion: FloatArray  # (5,) k1, k2, p1, p2, k3 as OpenCV orders and means them
 
     @property
+    def focal_px(self) -> float:
+        """One focal length for both axes, for what need not be exact."""
+        return math.sqrt(self.fx_px * self.fy_px)
+
+    @property
     def ideal(self) -> bool:
-        """Whether this is an undistorted pinhole with the principal point in the middle."""
+        """Whether this is an undistorted pinhole, its principal point in the image's middle."""
         middle = (self.cx_px, self.cy_px) == ((self.width - 1) / 2, (self.height - 1) / 2)
-        return middle and not np.any(self.distortion)
+        return middle and self.fx_px == self.fy_px and not np.any(self.distortion)
 
     def project(self, points: FloatArray) -> FloatArray:
         """Pixels (n, 2) of points (n, 3) in the camera frame."""
@@ -35,23 +42,27 @@ class Lens:
 
     def to_pixels(self, xy: FloatArray) -> FloatArray:
         """Pixels (n, 2) of undistorted normalised coordinates (n, 2)."""
-        middle = np.array([self.cx_px, self.cy_px])
-        return np.asarray(self.focal_px * self._distort(xy)[0] + middle, float)
+        focal, middle = self._pinhole()
+        return np.asarray(focal * self._distort(xy)[0] + middle, float)
 
     def to_rays(self, pixels: FloatArray) -> FloatArray:
         """Undistorted normalised coordinates (n, 2) of pixels (n, 2), by Newton's method.
 
         Raises ValueError where the distortion folds the image and no ray exists.
         """
-        wanted: FloatArray = (pixels - np.array([self.cx_px, self.cy_px])) / self.focal_px
+        focal, middle = self._pinhole()
+        wanted: FloatArray = (pixels - middle) / focal
         xy: FloatArray = wanted.copy()
         if not np.any(self.distortion):
             return xy
         for _ in range(_NEWTON_STEPS):
             seen, jacobian = self._distort(xy)
-            xy = xy + np.linalg.solve(jacobian, (wanted - seen)[..., None])[..., 0]
+            step = _solved(jacobian, wanted - seen)
+            xy = xy + step
+            if np.max(np.abs(step)) < 1e-14:
+                break
         seen, jacobian = self._distort(xy)
-        off_px = self.focal_px * np.max(np.abs(seen - wanted))
+        off_px = np.max(np.abs(focal * (seen - wanted)))
         if not off_px < 1e-6 or np.min(np.linalg.det(jacobian)) <= 0.0:
             raise ValueError(
                 f"camera.distortion = {self.distortion.tolist()} folds the image inside the frame"
@@ -60,10 +71,23 @@ class Lens:
 
     def ray_table(self) -> NDArray[np.float32]:
         """Undistorted normalised coordinates (2, height, width) of all pixels."""
-        v, u = np.mgrid[0 : self.height, 0 : self.width]
-        pixels = np.stack([u.ravel(), v.ravel()], axis=1).astype(float)
-        rays = self.to_rays(pixels).T.reshape(2, self.height, self.width)
-        return np.ascontiguousarray(rays, dtype=np.float32)
+        return self._table(self.height, self.width, 0.0)
+
+    def corner_ray_table(self) -> NDArray[np.float32]:
+        """As ``ray_table``, of the pixels' corners: (2, height + 1, width + 1).
+
+        Entry (v, u) is the corner that pixel (v, u) shares with its upper left neighbour.
+        """
+        return self._table(self.height + 1, self.width + 1, -0.5)
+
+    def _table(self, rows: int, columns: int, first: float) -> NDArray[np.float32]:
+        v, u = np.mgrid[0:rows, 0:columns] + first
+        rays = self.to_rays(np.stack([u.ravel(), v.ravel()], axis=1))
+        return np.ascontiguousarray(rays.T.reshape(2, rows, columns), dtype=np.float32)
+
+    def _pinhole(self) -> tuple[FloatArray, FloatArray]:
+        """Focal lengths and principal point, (2,) each."""
+        return np.array([self.fx_px, self.fy_px]), np.array([self.cx_px, self.cy_px])
 
     def _distort(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distorted coordinates (n, 2) and their derivative (n, 2, 2)."""
@@ -87,12 +111,25 @@ class Lens:
         return seen, jacobian
 
 
+def _solved(matrices: FloatArray, right: FloatArray) -> FloatArray:
+    """Solutions (n, 2) of n systems (n, 2, 2); not finite where one is singular."""
+    a, b, c, d = matrices.reshape(-1, 4).T
+    x, y = right.T
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        scale = 1.0 / (a * d - b * c)
+        return np.stack([(d * x - b * y) * scale, (a * y - c * x) * scale], axis=1)
+
+
 def lens_of(config: CameraConfig) -> Lens:
     """The configured lens."""
-    middle = ((config.width - 1) / 2, (config.height - 1) / 2)
-    cx, cy = middle if config.principal_point_px is None else config.principal_point_px
     return Lens(
-        config.width, config.height, config.focal_px, cx, cy, np.array(config.distortion, float)
+        width=config.width,
+        height=config.height,
+        fx_px=config.fx or config.focal_px,
+        fy_px=config.fy or config.focal_px,
+        cx_px=(config.width - 1) / 2 if config.cx is None else config.cx,
+        cy_px=(config.height - 1) / 2 if config.cy is None else config.cy,
+        distortion=np.array(config.distortion, float),
     )
 
 

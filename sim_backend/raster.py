@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_backend.lens import Lens
+from sim_backend.raster_board import BoardPainter
 from sim_backend.raster_floor import padded
 from sim_backend.raster_kernel import TILE, render_rows
 from sim_backend.raster_solids import CYLINDER, PACKED, SPHERE
@@ -27,9 +28,11 @@ class RasterRenderer:
         self._lens = lens
         self._rays = lens.ray_table()
         self._scene = scene
-        self._solids = np.array([_pack(solid) for solid in scene.solids])
-        self._greys = padded(scene.floor.greys)
-        self._floor_mean = np.float32(scene.floor.mean_grey)
+        self._solids = np.array([_pack(solid) for solid in scene.solids]).reshape(-1, PACKED)
+        self._floor = padded(scene.floor.greys)
+        self._board: BoardPainter | None = None
+        if scene.board is not None:
+            self._board = BoardPainter(scene.board, lens, scene.light, scene.ambient)
         self._helper = ThreadPoolExecutor(1, thread_name_prefix="raster")
         # Compiles the kernels now rather than in the middle of a run.
         self.render(np.eye(4)[None], (0, 1))
@@ -48,18 +51,49 @@ class RasterRenderer:
 
     def _fill(self, image: NDArray[np.float32], row0: int, poses: FloatArray) -> None:
         """Render the rows from ``row0`` that ``image`` has room for."""
+        if self._board is None:
+            self._draw(image, row0, poses, self._solids, self._scene.ambient, self._floor)
+            return
+        behind = self._board.hides(self._solids[:, 1:4], poses[0])
+        self._draw(image, row0, poses, self._solids[behind], self._scene.ambient, self._floor)
+        self._board.paint(image, row0, poses)
+        if not np.all(behind):
+            self._lay_over(image, row0, poses, self._solids[~behind])
+
+    def _lay_over(
+        self, image: NDArray[np.float32], row0: int, poses: FloatArray, solids: FloatArray
+    ) -> None:
+        """Draw ``solids`` in front of what ``image`` shows."""
+        black = np.zeros_like(self._floor)
+        radiance, cover = np.empty_like(image), np.empty_like(image)
+        self._draw(radiance, row0, poses, solids, self._scene.ambient, black)
+        # White ones, evenly lit, in front of black: their share of each pixel.
+        white = solids.copy()
+        white[:, 9] = 1.0
+        self._draw(cover, row0, poses, white, 1.0, black)
+        image[:] = (1.0 - cover) * image + radiance
+
+    def _draw(
+        self,
+        image: NDArray[np.float32],
+        row0: int,
+        poses: FloatArray,
+        solids: FloatArray,
+        ambient: float,
+        floor: NDArray[np.float32],
+    ) -> None:
         render_rows(
             image,
             row0,
             self._rays,
             self._lens.focal_px,
             poses,
-            self._solids,
+            solids,
             self._scene.light,
-            self._scene.ambient,
-            self._greys,
+            ambient,
+            floor,
             self._scene.floor.texel_m,
-            self._floor_mean,
+            np.float32(floor.mean()),
             self._floor_poses(poses),
         )
 

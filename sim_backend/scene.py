@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.special import ndtr
 
-from sim_backend.config import BackgroundConfig, SimConfig, Vec3
+from sim_backend.board import Board, build_board
+from sim_backend.config import BackgroundConfig, SimConfig
+from sim_backend.config_section import Vec3
 
 FloatArray = NDArray[np.float64]
 TargetKind = Literal["sphere", "cylinder"]
+SceneKind = Literal["sphere", "cylinder", "board"]
 
 _TEXTURE_SIZE = 512  # texels a side; a power of two, the texture repeats
 _TEXELS_PER_CORRELATION = 4.0
@@ -52,30 +55,49 @@ class Floor:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """The target, the distractors, the floor and the light; the target comes first."""
+    """The target, what else can be seen, and the light."""
 
-    solids: tuple[Sphere | Cylinder, ...]
+    target: Sphere | Cylinder | Board  # what the camera is there to look at
+    solids: tuple[Sphere | Cylinder, ...]  # among them the target, unless it is a board
+    board: Board | None  # the target where that is a board, and it is visible
     floor: Floor
     light: FloatArray  # (3,) unit, towards the light
     ambient: float
 
-    @property
-    def target(self) -> Sphere | Cylinder:
-        """The object to be measured."""
-        return self.solids[0]
+
+def middle_m(target: Sphere | Cylinder | Board) -> FloatArray:
+    """The target's reference point (3,) in base."""
+    return target.centre_m if isinstance(target, Sphere) else target.middle_m
 
 
-def build_scene(config: SimConfig, target: TargetKind) -> Scene:
-    """The configured scene with its ``target`` and all distractors."""
-    first: Sphere | Cylinder
-    if target == "sphere":
+def build_scene(config: SimConfig, kind: SceneKind) -> Scene:
+    """The configured scene with the target that ``kind`` names and all distractors."""
+    target = _target(config, kind)
+    board = target if isinstance(target, Board) else None
+    solids = () if isinstance(target, Board) else (target,)
+    return Scene(
+        target=target,
+        solids=(*solids, *_distractors(config)),
+        board=board if config.board.visible else None,
+        floor=_floor(config.background),
+        light=_unit(config.light.direction),
+        ambient=config.light.ambient,
+    )
+
+
+def _target(config: SimConfig, kind: SceneKind) -> Sphere | Cylinder | Board:
+    if kind == "board":
+        return build_board(config.board)
+    if kind == "sphere":
         s = config.sphere
-        first = Sphere(np.array(s.position_m), s.radius_m, s.albedo_grey)
-    else:
-        c = config.cylinder
-        first = Cylinder(
-            np.array(c.position_m), _unit(c.direction), c.length_m / 2, c.radius_m, c.albedo_grey
-        )
+        return Sphere(np.array(s.position_m), s.radius_m, s.albedo_grey)
+    c = config.cylinder
+    return Cylinder(
+        np.array(c.position_m), _unit(c.direction), c.length_m / 2, c.radius_m, c.albedo_grey
+    )
+
+
+def _distractors(config: SimConfig) -> list[Sphere | Cylinder]:
     spheres = [
         Sphere(np.array(d.position_m), d.radius_m, d.albedo_grey) for d in config.distractor_spheres
     ]
@@ -85,12 +107,7 @@ def build_scene(config: SimConfig, target: TargetKind) -> Scene:
         )
         for d in config.distractor_cylinders
     ]
-    return Scene(
-        solids=(first, *spheres, *cylinders),
-        floor=_floor(config.background),
-        light=_unit(config.light.direction),
-        ambient=config.light.ambient,
-    )
+    return [*spheres, *cylinders]
 
 
 def _unit(direction: Vec3) -> FloatArray:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from sim_backend.board import Board
 from sim_backend.motion import CameraMotion
 from sim_backend.scene import Cylinder, Sphere
 from sim_backend.world import World
@@ -13,14 +14,21 @@ FloatArray = NDArray[np.float64]
 class Truth:
     """What the estimator is trying to find out, at any instant of the last two minutes.
 
-    Every method raises ValueError for an instant before that span or after the present.
+    Every method raises ValueError for an instant before that span or after the present, and
+    where a radius is needed but the target is a board.
     """
 
-    def __init__(self, target: Sphere | Cylinder, world: World, motion: CameraMotion) -> None:
+    def __init__(
+        self, target: Sphere | Cylinder | Board, world: World, motion: CameraMotion
+    ) -> None:
         self._target = target
         self._world = world
         self._motion = motion
-        self.radius_m = target.radius_m
+
+    @property
+    def radius_m(self) -> float:
+        """The target's radius."""
+        return self._round().radius_m
 
     def T_base_camera(self, t_s: float) -> FloatArray:
         """The camera's true pose (4, 4)."""
@@ -35,7 +43,7 @@ class Truth:
     def s(self, t_s: float) -> FloatArray:
         """P0 / R (3,): the sphere's centre, or the axis point nearest the camera, in radii."""
         T = self.T_base_camera(t_s)
-        target = self._target
+        target = self._round()
         if isinstance(target, Sphere):
             P0 = T[:3, :3].T @ (target.centre_m - T[:3, 3])
         else:
@@ -47,7 +55,13 @@ class Truth:
 
     def axis(self, t_s: float) -> FloatArray | None:
         """The cylinder's unit axis (3,) in the camera frame; None for a sphere."""
-        if isinstance(self._target, Sphere):
+        target = self._round()
+        if isinstance(target, Sphere):
             return None
-        a: FloatArray = self.T_base_camera(t_s)[:3, :3].T @ self._target.axis
+        a: FloatArray = self.T_base_camera(t_s)[:3, :3].T @ target.axis
         return a
+
+    def _round(self) -> Sphere | Cylinder:
+        if isinstance(self._target, Board):
+            raise ValueError("the target is a calibration board: it has no radius and no axis")
+        return self._target

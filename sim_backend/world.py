@@ -16,6 +16,8 @@ from sim_backend.mujoco_import import load_mujoco
 
 FloatArray = NDArray[np.float64]
 
+_REST_KEPT_S = 1.0  # more than a frame is late
+
 
 class World:
     """The moving gantry on a clock.
@@ -30,14 +32,16 @@ class World:
         self._mujoco = load_mujoco()
         self._model, self._data = load_gantry(config)
         self._step_s = float(self._model.opt.timestep)
-        self._data.qpos[:] = q_start
+        # Views into MuJoCo's state: asking for them costs more than using them.
+        self._qpos, self._qvel = self._data.qpos, self._data.qvel
+        self._qpos[:] = q_start
         self._max_speed = np.repeat(
             [config.max_slide_speed_m_s, config.max_wrist_speed_rad_s], 3
         ).astype(float)
         self._max_acceleration = np.repeat(
             [config.max_slide_acceleration_m_s2, config.max_wrist_acceleration_rad_s2], 3
         ).astype(float)
-        self._reference = np.zeros(6)
+        self._reference = self._data.ctrl  # the joint velocities the drives are to follow
         self._twist_tool = np.zeros(6)
         self._expires_s = -math.inf
         # Compiles the kernel now rather than in the middle of a run; the reference stays zero.
@@ -60,26 +64,38 @@ class World:
             self._twist_tool = np.array(twist_tool, dtype=float)
             self._expires_s = now_s + hold_s
 
+    def skip_rest(self) -> None:
+        """Go on as if the gantry had stood still for a second, before anybody looked or commanded.
+
+        On the wall clock, where others took long to get ready: to compute a long standstill
+        when the first of them looks would take long, too.
+        """
+        now_s = self.clock.now_s()
+        with self._lock:
+            if now_s - self.history.start_s < 2.0 * _REST_KEPT_S:
+                return
+            self.history = JointHistory(now_s - _REST_KEPT_S, self._step_s)
+            for _ in range(round(_REST_KEPT_S / self._step_s)):
+                self.history.append(self._qpos, np.zeros(6))
+
     def _advance(self, now_s: float) -> None:
-        history, data, step = self.history, self._data, self._mujoco.mj_step
+        history, model, data, step = self.history, self._model, self._data, self._mujoco.mj_step
         # One step past the present: interpolation needs both ends. Reports of the arm are
         # delayed and frames lie in the past, so nobody sees this step early.
         wanted = math.ceil((now_s - history.start_s) / self._step_s - 1e-6) + 1
-        at_rest = np.zeros(6)
+        half_step_s, at_rest = 0.5 * self._step_s, np.zeros(6)
         while history.count < wanted:
             t_s = history.time_s(history.count - 1)
-            twist = self._twist_tool if t_s < self._expires_s else at_rest
-            self._update_reference(twist)
-            data.ctrl[:] = self._reference
-            step(self._model, data)
+            self._update_reference(self._twist_tool if t_s < self._expires_s else at_rest)
+            step(model, data)
             # MuJoCo moves the position by the step's *final* velocity, so that velocity is
             # the one held half a step earlier: pair it with the position of that instant.
-            history.append(data.qpos - 0.5 * self._step_s * data.qvel, data.qvel)
+            history.append(self._qpos - half_step_s * self._qvel, self._qvel)
 
     def _update_reference(self, twist_tool: FloatArray) -> None:
         update_reference(
             self._reference,
-            self._data.qpos,
+            self._qpos,
             twist_tool,
             self._max_speed,
             self._max_acceleration,

@@ -1,6 +1,7 @@
 """``python -m sim_backend.loopback_grbl --link PATH``: the gantry as a process of its own."""
 
 import argparse
+import contextlib
 import os
 import sys
 import threading
@@ -14,6 +15,7 @@ from sim_backend.loopback_grbl.machine import Machine
 from sim_backend.loopback_grbl.server import LoopbackGantry
 
 _LOOK_S = 0.05
+_PRIORITY = 20
 
 
 def main() -> int:
@@ -29,6 +31,9 @@ def main() -> int:
     parser.add_argument("--q-start", type=_numbers, help="joints in m and rad; default: zero")
     parser.add_argument("--end-with-stdin", action="store_true")
     options = parser.parse_args()
+    # It stands for another machine: it should not wait for the programs on this one.
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(_PRIORITY))
     machine = Machine(
         flavour=options.flavour, axes=options.axes, baud=options.baud, seed=options.seed
     )

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sim_backend.clock import SimulatedClock
-from sim_backend.config import BackgroundConfig, LightConfig, SimConfig, StartPose
+from sim_backend.config import BackgroundConfig, LightConfig, SimConfig
+from sim_backend.config_targets import StartPose
 from sim_backend.lens import Lens, lens_of
 from sim_backend.raster import RasterRenderer
 from sim_backend.rig import SimulatedRig

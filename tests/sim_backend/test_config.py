@@ -4,7 +4,8 @@ import pytest
 from pydantic import ValidationError
 
 from sim_backend.clock import SimulatedClock
-from sim_backend.config import SimConfig
+from sim_backend.config import CameraConfig, SimConfig
+from sim_backend.lens import lens_of
 from sim_backend.rig import SimulatedRig
 
 
@@ -29,6 +30,12 @@ from sim_backend.rig import SimulatedRig
         ({"seed": -1}, "seed"),
         ({"renderer": "vulkan"}, "renderer"),
         ({"camera": {"focal": 800}}, "camera.focal"),
+        ({"camera": {"fx": 0.0}}, "camera.fx"),
+        ({"camera": {"fx": 1200.0, "fy": 800.0}}, "camera.fx"),
+        ({"camera": {"cx": float("inf")}}, "camera.cx"),
+        ({"camera": {"stamps": "late"}}, "camera.stamps"),
+        ({"T_tool_camera": (0.0, 0.0, 0.1)}, "T_tool_camera"),
+        ({"T_tool_camera": (0.0, 0.0, 0.1, 0.0, 0.0, float("nan"))}, "T_tool_camera.5"),
     ],
 )
 def test_nonsense_is_refused_by_name(settings, key):
@@ -44,6 +51,13 @@ def test_every_key_has_a_default_and_the_configuration_is_frozen():
     assert (config.camera.latency_s, config.camera.noise_grey) == (0.040, 2.0)
     with pytest.raises(ValidationError, match="frozen"):
         config.seed = 3
+
+
+def test_focal_lengths_and_principal_point_come_one_by_one_or_by_default():
+    plain = lens_of(CameraConfig())
+    assert (plain.fx_px, plain.fy_px, plain.cx_px, plain.cy_px) == (800.0, 800.0, 319.5, 239.5)
+    lens = lens_of(CameraConfig(focal_px=780.0, fy=790.0, cx=310.0))
+    assert (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px) == (780.0, 790.0, 310.0, 239.5)
 
 
 def test_one_changed_value_of_a_start_pose_leaves_the_others_at_that_targets_defaults():

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
 
-from sim_backend.config import SimConfig, StartPose
+from sim_backend.config import SimConfig
+from sim_backend.config_targets import StartPose
 from sim_backend.gl import GlRenderer
 from sim_backend.raster import RasterRenderer
+from tests.sim_backend.charuco import expected, found, rms
 from tests.sim_backend.helpers import FLAT, coverage, drawn, view
 
 pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
@@ -16,7 +18,7 @@ pytestmark = [pytest.mark.gl, pytest.mark.usefixtures("gl")]
 LENSES = {
     "pinhole": {},
     "distorted": {"camera": {"distortion": (-0.15, 0.03, 0.001, -0.001, 0.0)}},
-    "off-centre": {"camera": {"principal_point_px": (310.0, 250.5)}},
+    "off-centre": {"camera": {"cx": 310.0, "cy": 250.5}},
 }
 
 
@@ -107,3 +109,33 @@ def test_threads_may_take_turns_with_one_renderer():
     np.testing.assert_array_equal(there[0], here)
     np.testing.assert_array_equal(renderer.render(T[None], (0, 480)), here)
     renderer.close()
+
+
+@pytest.mark.parametrize("lens_name", LENSES)
+def test_corners_of_a_board_agree_within_a_twentieth_of_a_pixel(lens_name):
+    settings = LENSES[lens_name]
+    config = SimConfig.model_validate(settings)
+    errors, differences = [], []
+    for tilt_deg in (-30, 5, 25):
+        start = StartPose(distance_m=0.38, tilt_x_deg=tilt_deg, tilt_y_deg=12, spin_deg=tilt_deg)
+        scene, lens, T = view("board", start, **settings)
+        pixels, points = found(gl_drawn(scene, lens, T), config.board)
+        exact = expected(points, scene.target, lens, T)
+        assert len(points) > 18
+        errors.append(pixels - exact)
+        differences.append(gl_drawn(scene, lens, T) - drawn(scene, lens, T))
+    assert rms(np.concatenate(errors)) < 0.05
+    assert rms(np.array(differences)) < 8.0
+
+
+def test_a_board_is_white_from_behind_and_hides_and_is_hidden_as_in_the_software_renderer():
+    near = {"radius_m": 0.02, "position_m": (0.03, 0.0, 0.35), "albedo_grey": 90.0}
+    far = {"radius_m": 0.05, "position_m": (-0.12, 0.0, 0.2), "albedo_grey": 140.0}
+    start = SimConfig().board.start
+    scene, lens, T = view("board", start, **FLAT, distractor_spheres=[near, far])
+    below = np.eye(4)
+    below[:3, 3] = (0.0, 0.0, 0.2)
+    for pose in (T, below):
+        difference = np.abs(gl_drawn(scene, lens, pose) - drawn(scene, lens, pose))
+        assert np.median(difference) < 0.6
+        assert np.mean(difference > 40) < 0.005

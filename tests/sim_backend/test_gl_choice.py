@@ -83,6 +83,12 @@ def test_the_choice(monkeypatch, wanted, reason, name):
     assert choice.choose_renderer(wanted) == name
 
 
+@pytest.mark.parametrize(("wanted", "name"), [("auto", "raster"), ("gl", "gl")])
+def test_a_board_is_drawn_exactly_unless_gl_is_asked_for(monkeypatch, wanted, name):
+    monkeypatch.setattr(choice, "why_no_gl", lambda: "")
+    assert choice.choose_renderer(wanted, "board") == name
+
+
 def test_gl_wanted_but_impossible_is_a_connect_error_with_the_reason(monkeypatch):
     monkeypatch.setattr(choice, "why_no_gl", lambda: "egl: library gone")
     with pytest.raises(ConnectError, match="egl: library gone"):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sim_backend.config import SimConfig, StartPose
+from sim_backend.config import SimConfig
+from sim_backend.config_targets import StartPose
 from sim_backend.raster import RasterRenderer
 from sim_backend.raster_pixel import covered_share
 from sim_backend.scene import Cylinder, Sphere
