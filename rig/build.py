@@ -14,12 +14,20 @@ from drivers.clock import Clock, WallClock
 from drivers.errors import ConfigError
 from drivers.interfaces import Arm, Camera
 from estimator.image.intrinsics import Intrinsics
+from estimator.image.tracker import TargetTracker, warm_up
 from rig.config import RigConfig, TargetKind
+from rig.config_devices import ArmConfig, CameraConfig
+from rig.vision import Vision
+from rig.vision.inline import InlineVision
+from rig.vision.messages import Job
+from rig.vision.process import Feed, ProcessVision
+from rig.vision.threaded import ThreadedVision
 
 FloatArray = NDArray[np.float64]
 
 # Lazy, so that a vendor's package costs nothing, and need not exist, until it is chosen.
 _SIMULATED = "rig.build_sim:build_simulated"
+_REMOTE_CAMERA = "rig.build_sim:build_remote_camera"
 _CAMERAS = {"opencv": "drivers.camera.open:open_camera"}
 _ARMS = {"ur": "drivers.ur.arm:UrArm", "grbl": "drivers.grbl.arm:GrblArm"}
 
@@ -27,34 +35,39 @@ _ARMS = {"ur": "drivers.ur.arm:UrArm", "grbl": "drivers.grbl.arm:GrblArm"}
 class Truth(Protocol):
     """What a simulated rig knows and a real one does not; for error figures only."""
 
-    radius_m: float
+    @property
+    def radius_m(self) -> float:
+        """The target's radius."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """Open devices, and the geometry they were delivered with (None: it has to be calibrated)."""
+    """Simulated devices, and the geometry they were delivered with."""
 
-    camera: Camera
+    camera: Camera | None  # None: it is simulated in the vision process
+    feed: Feed | None  # what that camera follows
     arm: Arm
     clock: Clock
-    realtime: bool  # whether the clock runs by itself
     intrinsics: Intrinsics | None
     T_tool_camera: FloatArray | None  # (4, 4)
     renderer: str | None  # None on real hardware
     truth: Truth | None  # None on real hardware
+    everything_ready: Callable[[], None]  # to be called when vision is: time begins to matter
 
 
+@dataclass(frozen=True, slots=True)
 class Rig:
-    """Open devices with the geometry to use; closing stops the arm, whatever happened."""
+    """An open arm, vision at work, and the geometry to use; leaving it stops the arm first."""
 
-    def __init__(self, devices: Devices, config: RigConfig) -> None:
-        self.camera = devices.camera
-        self.arm = devices.arm
-        self.clock = devices.clock
-        self.realtime = devices.realtime
-        self.renderer = devices.renderer
-        self.truth = devices.truth
-        self.intrinsics, self.T_tool_camera = _geometry(config, devices)
+    arm: Arm
+    vision: Vision
+    clock: Clock
+    realtime: bool  # whether the clock runs by itself
+    intrinsics: Intrinsics
+    T_tool_camera: FloatArray  # (4, 4)
+    renderer: str | None = None  # None on real hardware
+    truth: Truth | None = None  # None on real hardware
 
     def __enter__(self) -> Self:
         return self
@@ -68,49 +81,109 @@ class Rig:
         try:
             self.arm.close()
         finally:
-            self.camera.close()
+            self.vision.close()
 
 
 def build_rig(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
-    """Open the rig's devices; ``realtime`` puts a simulated rig on the wall clock.
+    """Open the rig for a run; ``realtime`` puts a simulated rig on the wall clock.
 
     Raises ConfigError for devices that do not go together or lack a calibration, ConnectError
     when one cannot be opened. What was opened before is closed again.
     """
     drivers = (config.camera.driver, config.arm.driver)
     if drivers == ("sim", "sim"):
-        simulated = cast(
-            Callable[[RigConfig, TargetKind, Clock | None], Devices], _load(_SIMULATED)
-        )
-        return Rig(simulated(config, target, WallClock() if realtime else None), config)
+        return _simulated(config, target, realtime)
     if "sim" in drivers:
         raise ConfigError(
             f"camera.driver = {drivers[0]} and arm.driver = {drivers[1]} do not go together: "
             "the simulated camera shows what the simulated arm does, so choose both or neither"
         )
-    return _open_hardware(config)
+    return _hardware(config, target)
 
 
-def _open_hardware(config: RigConfig) -> Rig:
-    _geometry(config, None)  # nothing is opened for a rig that cannot be used
+def open_camera(config: CameraConfig, clock: Clock) -> Camera:
+    """A real camera; raises ConnectError when it cannot be opened."""
+    camera_of = cast(Callable[[object, Clock], Camera], load_entry(_CAMERAS[config.driver]))
+    return camera_of(config, clock)
+
+
+def open_arm(config: ArmConfig, clock: Clock) -> Arm:
+    """A real arm; raises ConnectError when it cannot be opened."""
+    arm_of = cast(Callable[[object, Clock], Arm], load_entry(_ARMS[config.driver]))
+    return arm_of(config, clock)
+
+
+def open_remote_camera(
+    config: RigConfig, target: TargetKind, feed: int | None, clock: Clock
+) -> Camera:
+    """The camera as the vision process opens it: a real one, or one that follows a ``feed``."""
+    if feed is None:
+        return open_camera(config.camera, clock)
+    build = cast(Callable[[RigConfig, TargetKind, int, Clock], Camera], load_entry(_REMOTE_CAMERA))
+    return build(config, target, feed, clock)
+
+
+def _simulated(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
+    apart = realtime and config.run.vision != "thread"
+    build = cast(
+        Callable[[RigConfig, TargetKind, Clock | None, bool], Devices], load_entry(_SIMULATED)
+    )
+    devices = build(config, target, WallClock() if realtime else None, apart)
+    intrinsics, T_tool_camera = given_geometry(config, devices)
+    vision: Vision
+    if devices.camera is None:
+        vision = ProcessVision(Job(config, target, intrinsics), devices.clock, devices.feed)
+    else:
+        here = ThreadedVision if realtime else InlineVision
+        vision = here(devices.camera, _tracker(config, target, intrinsics))
+    devices.everything_ready()
+    return Rig(
+        arm=devices.arm,
+        vision=vision,
+        clock=devices.clock,
+        realtime=realtime,
+        intrinsics=intrinsics,
+        T_tool_camera=T_tool_camera,
+        renderer=devices.renderer,
+        truth=devices.truth,
+    )
+
+
+def _hardware(config: RigConfig, target: TargetKind) -> Rig:
+    # First of all: nothing is opened for a rig that cannot be used.
+    intrinsics, T_tool_camera = given_geometry(config, None)
     clock = WallClock()
-    camera_of = cast(Callable[[object, Clock], Camera], _load(_CAMERAS[config.camera.driver]))
-    arm_of = cast(Callable[[object, Clock], Arm], _load(_ARMS[config.arm.driver]))
-    camera = camera_of(config.camera, clock)
+    vision = _real_vision(config, target, intrinsics, clock)
     try:
-        arm = arm_of(config.arm, clock)
+        arm = open_arm(config.arm, clock)
     except BaseException:
-        camera.close()
+        vision.close()
         raise
-    return Rig(Devices(camera, arm, clock, True, None, None, None, None), config)
+    return Rig(arm, vision, clock, True, intrinsics, T_tool_camera)
 
 
-def _load(entry: str) -> object:
+def _real_vision(
+    config: RigConfig, target: TargetKind, intrinsics: Intrinsics, clock: Clock
+) -> Vision:
+    if config.run.vision == "thread":
+        tracker = _tracker(config, target, intrinsics)
+        return ThreadedVision(open_camera(config.camera, clock), tracker)
+    return ProcessVision(Job(config, target, intrinsics), clock)
+
+
+def _tracker(config: RigConfig, target: TargetKind, intrinsics: Intrinsics) -> TargetTracker:
+    """A tracker whose kernels are compiled."""
+    warm_up(target, intrinsics, config.camera.method)
+    return TargetTracker(target, intrinsics, config.camera.method)
+
+
+def load_entry(entry: str) -> object:
+    """What ``module:name`` names, imported only now."""
     module, _, name = entry.partition(":")
     return getattr(import_module(module), name)
 
 
-def _geometry(config: RigConfig, devices: Devices | None) -> tuple[Intrinsics, FloatArray]:
+def given_geometry(config: RigConfig, devices: Devices | None) -> tuple[Intrinsics, FloatArray]:
     """The calibration of the configuration, or else what the devices were delivered with."""
     intrinsics, T_tool_camera = _intrinsics(config), _hand_eye(config)
     if devices is not None:

@@ -1,6 +1,7 @@
 """One run from configuration to summary: build, loop, analyse, write."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,20 +9,25 @@ from drivers.clock import Clock, WallClock
 from estimator.active.controller import Controller
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.image.intrinsics import Intrinsics
-from estimator.image.tracker import TargetTracker, warm_up
 from estimator.models.cylinder import Cylinder
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
 from rig.analysis import Analysis, analyse
+from rig.background_view import BackgroundView
 from rig.build import Rig, build_rig
 from rig.config import MotionConfig, RigConfig, TargetKind
+from rig.deadman import Deadman
+from rig.envelope import Envelope
 from rig.fusion import Fusion
 from rig.live import View
-from rig.loop import RunLoop, RunOutcome
+from rig.loop import RunLoop
+from rig.outcome import RunOutcome
+from rig.realtime import control_conditions
 from rig.records import Json, RunLog
+from rig.rehearsal import rehearse
 from rig.run_data import RunData
+from rig.safety import Limiter
 from rig.summary import summarise
-from rig.vision import InlineVision, ThreadedVision
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,32 +53,61 @@ def execute(
     Raises ConnectError when a device cannot be opened; failures during the run are in
     ``outcome.error``.
     """
-    with build_rig(config, target, realtime) as rig, RunLog(run_dir, config) as log:
-        warm_up(target, rig.intrinsics, config.camera.method)
+    rehearse(make_observer(config, target), make_controller(config.motion), target)
+    with (
+        build_rig(config, target, realtime) as rig,
+        RunLog(run_dir, config, in_background=rig.realtime) as log,
+    ):
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
-        tracker = TargetTracker(target, rig.intrinsics, config.camera.method)
-        vision = (ThreadedVision if rig.realtime else InlineVision)(rig.camera, tracker)
-        loop = RunLoop(
-            clock=rig.clock,
-            arm=rig.arm,
-            vision=vision,
-            fusion=Fusion(make_observer(config, target), data, log, config.safety.max_state_age_s),
-            controller=make_controller(config.motion),
-            config=config,
-            data=data,
-            log=log,
-            stop_requested=stop_requested,
-            on_tick=view.show,
+        # What has to be compiled is compiled here, before time counts.
+        fusion = Fusion(
+            make_observer(config, target),
+            data,
+            log,
+            # Above the age at which the supervisor calls the states stale, in better words.
+            2.0 * config.safety.max_state_age_s,
+            config.calibration.latency_s,
         )
+        controller = make_controller(config.motion)
+        envelope = Envelope(config.safety, rig.T_tool_camera, rig.intrinsics)
         wall: Clock = WallClock()
         wall_start_s = wall.now_s()
-        try:
-            with view:
-                outcome = loop.run()
-        finally:
-            vision.close()
+        with _conditions(rig, config) as (scheduling, deadman), _shown(view, rig) as shown:
+            loop = RunLoop(
+                clock=rig.clock,
+                arm=rig.arm,
+                vision=rig.vision,
+                fusion=fusion,
+                controller=controller,
+                limiter=Limiter(config.safety, envelope),
+                config=config,
+                data=data,
+                log=log,
+                stop_requested=stop_requested,
+                on_tick=shown.show,
+                deadman=deadman,
+            )
+            outcome = loop.run()
+        outcome.stats.scheduling = scheduling
         wall_s = wall.now_s() - wall_start_s
         return _result(rig, outcome, config, target, run_dir, wall_s)
+
+
+def _shown(view: View, rig: Rig) -> View:
+    return BackgroundView(view) if rig.realtime else view
+
+
+@contextmanager
+def _conditions(rig: Rig, config: RigConfig) -> Iterator[tuple[str, Deadman | None]]:
+    """On the wall clock: priority for the loop, and the deadman, whose thread gets it too."""
+    if not rig.realtime:
+        yield "simulated time", None
+        return
+    with (
+        control_conditions(config.run.scheduling) as scheduling,
+        closing(Deadman(rig.clock, config.arm.hold_s, rig.arm.stop)) as deadman,
+    ):
+        yield scheduling, deadman
 
 
 def _result(
