@@ -5,35 +5,13 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from rig.config_calibration import CalibrationConfig
 from rig.config_devices import ArmConfig, CameraConfig, SimArm, SimCamera
-from rig.config_section import Finite, NotNegative, Positive, Section
+from rig.config_safety import SafetyConfig
+from rig.config_section import Finite, NotNegative, Section
 from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
-
-
-class IntrinsicsConfig(Section):
-    """Pinhole with Brown-Conrady distortion; pixel centres at integer coordinates."""
-
-    fx_px: Positive
-    fy_px: Positive
-    cx_px: Finite
-    cy_px: Finite
-    distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class CalibrationConfig(Section):
-    """What is known about the rig's geometry; left out, the device's own factory values hold."""
-
-    intrinsics: IntrinsicsConfig | None = None
-    tool_camera_xyz_m: tuple[Finite, Finite, Finite] | None = None
-    tool_camera_rotvec_rad: tuple[Finite, Finite, Finite] | None = None
-
-    @model_validator(mode="after")
-    def _hand_eye_whole(self) -> Self:
-        if (self.tool_camera_xyz_m is None) != (self.tool_camera_rotvec_rad is None):
-            raise ValueError("tool_camera_xyz_m and tool_camera_rotvec_rad go together: give both")
-        return self
 
 
 class EstimatorConfig(Section):
@@ -55,34 +33,16 @@ class MotionConfig(Section):
     centring_gain_per_s: Annotated[float, Field(gt=0, le=10)] = 5.0
 
 
-class SafetyConfig(Section):
-    """The envelope no command leaves; limits of the tool, in the base frame where directed."""
-
-    max_linear_speed_m_s: Positive = 0.15
-    max_angular_speed_rad_s: Positive = 1.0
-    max_linear_acceleration_m_s2: Positive = 1.0
-    max_angular_acceleration_rad_s2: Positive = 5.0
-    workspace_min_m: tuple[Finite, Finite, Finite] = (-2.0, -2.0, 0.05)
-    workspace_max_m: tuple[Finite, Finite, Finite] = (2.0, 2.0, 2.0)
-    # A frame older than this is not acted upon: the arm ramps to rest until a new one comes.
-    max_feature_age_s: Positive = 0.3
-    # Resting without a target for this long ends the run.
-    target_lost_after_s: Positive = 2.0
-    max_state_age_s: Positive = 0.1
-
-    @model_validator(mode="after")
-    def _box_not_empty(self) -> Self:
-        if any(lo >= hi for lo, hi in zip(self.workspace_min_m, self.workspace_max_m, strict=True)):
-            raise ValueError("workspace_min_m must lie below workspace_max_m on every axis")
-        return self
-
-
 class RunConfig(Section):
     """How long a run lasts and how fast it ticks."""
 
     duration_s: Annotated[float, Field(gt=0, le=3600)] = 6.0
     control_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     until_converged: bool = False
+    # Where images are measured; auto: for a real camera in a process of its own.
+    vision: Literal["auto", "thread", "process"] = "auto"
+    # Whether the control loop asks the system for real-time priority; auto: where it is allowed.
+    scheduling: Literal["auto", "normal", "realtime"] = "auto"
     # Converged: the predicted rest of the transient and the drift of R over the last second
     # are both below this fraction.
     converged_fraction: Annotated[float, Field(gt=0, lt=1)] = 0.002

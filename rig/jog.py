@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.errors import ConfigError, DeviceTimeoutError
-from drivers.interfaces import Arm, ArmState
-from rig.config import SafetyConfig
+from drivers.interfaces import Arm, ArmState, JointArm
+from rig.config_safety import SafetyConfig
+from rig.envelope import Surroundings
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
 
@@ -82,6 +83,7 @@ class _Jog:
         self._twist = twist
         self._in_base = in_base
         self._limiter = Limiter(safety)
+        self._joint_arm: JointArm | None = arm if isinstance(arm, JointArm) else None
         self._states: list[ArmState] = []
         self._allowed = np.zeros(6)
         self._reasons: set[str] = set()
@@ -115,12 +117,16 @@ class _Jog:
             if self._in_base:
                 wanted = _rotate(state.T_base_tool[:3, :3].T, wanted)
             dt_s = min(max(now_s - last_s, 1.0 / _RATE_HZ), 3.0 / _RATE_HZ)
-            allowed = self._limiter.limit(wanted, state, dt_s)
+            allowed = self._limiter.limit(wanted, self._surroundings(state), dt_s)
             self._arm.command_twist(allowed.twist_tool, _HOLD_S)
             self._allowed = allowed.twist_tool
             self._reasons.update(allowed.reasons)
             last_s = now_s
         return False
+
+    def _surroundings(self, state: ArmState) -> Surroundings:
+        joints = None if self._joint_arm is None else self._joint_arm.joints()
+        return Surroundings(state, joints=joints)
 
     def watch_stop(self) -> None:
         """Read on until the arm is at rest, or for 3 s."""

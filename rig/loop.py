@@ -1,8 +1,7 @@
 """One control tick after another: states and images in, estimate, command, record, stop."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
+from contextlib import suppress
 
 import numpy as np
 
@@ -11,63 +10,26 @@ from drivers.errors import DeviceTimeoutError, RigError, SafetyError
 from drivers.interfaces import Arm, ArmState
 from estimator.active.controller import Controller
 from estimator.estimate import Estimate
+from rig.commander import Commander
 from rig.config import RigConfig
 from rig.convergence import Convergence
+from rig.deadman import Deadman
 from rig.frames import twist_map
 from rig.fusion import Fusion
+from rig.outcome import Ending, LiveStatus, RunOutcome
 from rig.records import RunLog
 from rig.run_data import RunData
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
+from rig.supervisor import RigState, Supervisor, Verdict
 from rig.vision import Vision
+from rig.watch import Watch
 
 _AT_REST_M_S = 2e-3
 _AT_REST_RAD_S = 1e-2
 _REST_TIMEOUT_S = 3.0
 # After a long gap the controller and the limiter act as if it had been this many ticks.
 _LONGEST_STEP_TICKS = 3.0
-
-
-class Ending(Enum):
-    """Why a run ended."""
-
-    TIME = "duration reached"
-    CONVERGED = "converged"
-    INTERRUPTED = "interrupted"
-    TARGET_LOST = "target lost"
-    SAFETY_STOP = "safety stop"
-    DEVICE_FAILURE = "device failure"
-
-
-@dataclass(frozen=True, slots=True)
-class LiveStatus:
-    """What a person watching wants to know, once a tick."""
-
-    elapsed_s: float  # since the loop started
-    estimate: Estimate | None
-    target_state: str  # "searching: …", "tracking", "lost: …"
-    frames: int
-    frames_lost: int
-    ticks: int
-    overruns: int
-    speed_m_s: float  # measured, of the camera
-    limited_by: tuple[str, ...]
-    remaining_fraction: float  # predicted rest of the observer's transient
-
-
-@dataclass(frozen=True, slots=True)
-class RunOutcome:
-    """How a run went; ``error`` is set when a device or the safety ended it."""
-
-    ending: Ending
-    data: RunData
-    stats: TickStats
-    started_s: float
-    ended_s: float
-    at_rest: bool
-    remaining_fraction: float
-    target_state: str
-    error: RigError | None
 
 
 class RunLoop:
@@ -80,28 +42,37 @@ class RunLoop:
         vision: Vision,
         fusion: Fusion,
         controller: Controller,
+        limiter: Limiter,
         config: RigConfig,
         data: RunData,
         log: RunLog,
         stop_requested: Callable[[], bool],
         on_tick: Callable[[LiveStatus], None],
+        deadman: Deadman | None = None,
     ) -> None:
         self._clock = clock
         self._arm = arm
         self._vision = vision
         self._fusion = fusion
         self._controller = controller
+        self._limiter = limiter
         self._config = config
         self._data = data
         self._log = log
         self._stop_requested = stop_requested
         self._on_tick = on_tick
+        self._commander = Commander(arm, limiter, data, log, config.arm.hold_s, deadman)
         self._period_s = 1.0 / config.run.control_rate_hz
-        self._limiter = Limiter(config.safety)
+        self._tool_from_camera = twist_map(data.T_tool_camera)
+        self._watch = Watch(config, fusion, vision)
+        self._supervisor = Supervisor(config.safety)
         self._convergence = Convergence(config, data)
         self._stats = TickStats()
         self._started_s = 0.0
+        self._last_s = 0.0  # the tick before this one
         self._first_feature_s: float | None = None
+        self._envelope = ""  # the barrier that blocked the motion at the last tick
+        self._last_hold = ""
         self._target_state = "searching: no image arrived yet"
 
     def run(self) -> RunOutcome:
@@ -112,18 +83,20 @@ class RunLoop:
         """
         self._started_s = self._clock.now_s()
         self._log.event(self._started_s, "started")
-        error: RigError | None = None
+        self._supervisor.start(self._started_s)
+        self._watch.start(self._started_s)
         try:
-            ending = self._until_an_end()
-            self._ramp_to_rest()
-        except SafetyError as stop:
-            ending, error = Ending.SAFETY_STOP, stop
-        except RigError as failure:
-            ending, error = Ending.DEVICE_FAILURE, failure
-        finally:
+            ending, error = self._until_an_end()
+        except BaseException as crash:
             self._arm.stop()
+            with suppress(OSError):  # a full disk must not hide what happened
+                self._log.event(self._clock.now_s(), "ended", repr(crash))
+            raise
+        self._arm.stop()
         at_rest = self._wait_for_rest()
         ended_s = self._clock.now_s()
+        if at_rest and error is None:
+            self._enter(RigState.STOPPED, ending.value)
         self._log.event(ended_s, "ended", ending.value if error is None else str(error))
         return RunOutcome(
             ending=ending,
@@ -134,82 +107,122 @@ class RunLoop:
             at_rest=at_rest,
             remaining_fraction=self._convergence.remaining_fraction,
             target_state=self._target_state,
+            holds=self._supervisor.holds,
+            last_hold=self._last_hold,
             error=error,
         )
 
-    def _until_an_end(self) -> Ending:
+    def _until_an_end(self) -> tuple[Ending, RigError | None]:
+        """Tick until something ends the run, then ramp down; failures are returned."""
+        ending: Ending | None = None
+        error: RigError | None = None
+        try:
+            verdict = self._tick_until_over()
+            ending, error = verdict.ending, verdict.error
+            self._enter(RigState.STOPPING, verdict.detail or str(ending and ending.value))
+            self._ramp_to_rest()
+        except RigError as failure:
+            if error is None:  # what came first is what the user has to know
+                stop = isinstance(failure, SafetyError)
+                ending = Ending.SAFETY_STOP if stop else Ending.DEVICE_FAILURE
+                error = failure
+        assert ending is not None  # either the ticks ended, or an error was raised
+        if error is not None:
+            self._enter(RigState.FAULT, str(error))
+        return ending, error
+
+    def _tick_until_over(self) -> Verdict:
         # What piled up while devices were opened is taken before the first tick, not within it.
         self._fusion.add_states(self._arm.read_states())
-        last_s = self._clock.now_s() - self._period_s
+        self._last_s = self._clock.now_s() - self._period_s
         for now_s in tick_grid(self._clock, self._period_s, self._stats):
             state = self._read(now_s)
             estimate = self._fusion.advance(now_s)
             self._convergence.update()
-            self._watch_target(now_s)
-            ending = self._ending(now_s)
-            if ending is not None:
-                return ending
+            verdict = self._judge(now_s, state, estimate)
+            if verdict.ending is None:
+                verdict = self._own_ending(now_s) or verdict
+            if verdict.ending is not None:
+                return verdict
             if state is not None:
-                dt_s = min(now_s - last_s, _LONGEST_STEP_TICKS * self._period_s)
-                self._command(now_s, dt_s, estimate, state)
-            last_s = now_s
+                self._command(now_s, verdict, estimate, state)
+            self._last_s = now_s
         raise AssertionError("the tick grid is endless")
 
     def _read(self, now_s: float) -> ArmState | None:
-        """Take what the devices have; the newest arm state, checked."""
+        """Take what the devices have; the newest arm state, its motion checked."""
         self._fusion.add_states(self._arm.read_states())
         self._fusion.add_sightings(self._vision.poll(), now_s)
         state = self._fusion.state
         if state is not None:
-            self._limiter.check_state(state, now_s)
+            self._limiter.check_motion(state)
         elif now_s - self._started_s > self._config.safety.max_state_age_s:
             raise DeviceTimeoutError("the arm reports no state: check its connection and power")
         return state
 
-    def _watch_target(self, now_s: float) -> None:
-        """Follow searching → tracking ↔ lost by the age of the last feature."""
-        fusion, before = self._fusion, self._target_state.partition(":")[0]
-        if fusion.last_feature_s is None:
-            self._target_state = f"searching: {fusion.reason}"
+    def _judge(self, now_s: float, state: ArmState | None, estimate: Estimate | None) -> Verdict:
+        """What the supervisor makes of this tick."""
+        signs = self._watch.signs(now_s, self._last_s, state, self._still_blocked(estimate, state))
+        self._follow_target(now_s, signs.target_lost or signs.no_image)
+        if signs.overrun:
+            self._log.event(now_s, "overrun", signs.overrun)
+            self._commander.restart()
+        before = self._supervisor.state
+        verdict = self._supervisor.judge(signs)
+        if verdict.state is not before and verdict.ending is None:
+            self._log.event(now_s, f"state {verdict.state}", verdict.detail)
+        if verdict.state is RigState.HOLDING:
+            self._last_hold = verdict.detail
+        return verdict
+
+    def _still_blocked(self, estimate: Estimate | None, state: ArmState | None) -> str:
+        """The barrier in the way: as the last tick found it, or while holding, looked at anew."""
+        if not self._envelope or state is None or estimate is None:
+            return ""
+        if self._supervisor.state is RigState.HOLDING:
+            wanted = self._tool_from_camera @ self._controller.twist(estimate, 0.0)
+            self._envelope = self._commander.still_blocked(wanted, state, estimate)
+        return self._envelope
+
+    def _follow_target(self, now_s: float, missing: str) -> None:
+        """Follow searching → tracking ↔ lost."""
+        before = self._target_state.partition(":")[0]
+        if self._fusion.last_feature_s is None:
+            self._target_state = f"searching: {missing}"
             return
         if self._first_feature_s is None:
             self._first_feature_s = now_s
-        age_s = now_s - fusion.last_feature_s
-        fresh = age_s <= self._config.safety.max_feature_age_s
-        self._target_state = "tracking" if fresh else f"lost: {fusion.reason}"
+        self._target_state = f"lost: {missing}" if missing else "tracking"
         if self._target_state.partition(":")[0] != before:
-            self._log.event(now_s, "target " + self._target_state.partition(":")[0], fusion.reason)
+            self._log.event(now_s, "target " + self._target_state.partition(":")[0], missing)
 
-    def _ending(self, now_s: float) -> Ending | None:
-        run, safety = self._config.run, self._config.safety
+    def _own_ending(self, now_s: float) -> Verdict | None:
+        """The verdict when the run is over without any trouble."""
+        run = self._config.run
         if self._stop_requested():
-            return Ending.INTERRUPTED
-        seen_s = self._fusion.last_feature_s
-        if now_s - (self._started_s if seen_s is None else seen_s) > safety.target_lost_after_s:
-            return Ending.TARGET_LOST
+            return Verdict(RigState.STOPPING, ending=Ending.INTERRUPTED)
         if self._first_feature_s is not None:
             if now_s - self._first_feature_s >= run.duration_s:
-                return Ending.TIME
+                return Verdict(RigState.STOPPING, ending=Ending.TIME)
             if run.until_converged and self._convergence.reached():
-                return Ending.CONVERGED
+                return Verdict(RigState.STOPPING, ending=Ending.CONVERGED)
         return None
 
     def _command(
-        self, now_s: float, dt_s: float, estimate: Estimate | None, state: ArmState
+        self, now_s: float, verdict: Verdict, estimate: Estimate | None, state: ArmState
     ) -> None:
-        """Command what the controller wants and the envelope allows; rest without a target."""
+        """Command what the controller wants and the envelope allows; rest unless running."""
+        dt_s = min(now_s - self._last_s, _LONGEST_STEP_TICKS * self._period_s)
         wanted = np.zeros(6)
-        if estimate is not None and self._target_state == "tracking":
-            twist_camera = self._controller.twist(estimate, dt_s)
-            wanted = twist_map(self._data.T_tool_camera) @ twist_camera
-        allowed = self._limiter.limit(wanted, state, dt_s)
-        self._arm.command_twist(allowed.twist_tool, self._config.arm.hold_s)
-        self._log.command(
-            now_s, wanted, allowed.twist_tool, state.twist_tool, list(allowed.reasons)
-        )
+        if estimate is not None and verdict.state is RigState.RUNNING:
+            wanted = self._tool_from_camera @ self._controller.twist(estimate, dt_s)
+        allowed = self._commander.send(now_s, wanted, state, estimate, dt_s)
+        if verdict.state is RigState.RUNNING:
+            self._envelope = allowed.blocked
         self._on_tick(
             LiveStatus(
                 elapsed_s=now_s - self._started_s,
+                state=f"{verdict.state}: {verdict.detail}" if verdict.detail else verdict.state,
                 estimate=estimate,
                 target_state=self._target_state,
                 frames=self._data.frames,
@@ -229,12 +242,9 @@ class RunLoop:
             state = self._read(now_s)
             if state is None:
                 return
+            self._limiter.check_age(state, now_s)
             dt_s = min(now_s - last_s, _LONGEST_STEP_TICKS * self._period_s) or self._period_s
-            allowed = self._limiter.limit(np.zeros(6), state, dt_s)
-            self._arm.command_twist(allowed.twist_tool, self._config.arm.hold_s)
-            self._log.command(
-                now_s, np.zeros(6), allowed.twist_tool, state.twist_tool, list(allowed.reasons)
-            )
+            allowed = self._commander.send(now_s, np.zeros(6), state, None, dt_s)
             last_s = now_s
             if not np.any(allowed.twist_tool):
                 return
@@ -252,6 +262,11 @@ class RunLoop:
                 return True
             self._clock.sleep_until(self._clock.now_s() + self._period_s)
         return False
+
+    def _enter(self, state: RigState, detail: str) -> None:
+        now_s = self._clock.now_s()
+        self._supervisor.enter(state, now_s, detail)
+        self._log.event(now_s, f"state {state}", detail)
 
 
 def _at_rest(state: ArmState) -> bool:

@@ -1,11 +1,12 @@
 """The loop: how runs end, and that every ending leaves the arm at rest."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rig.loop import Ending, LiveStatus
+from rig.outcome import Ending, LiveStatus
 from tests.rig.fakes import RADIUS_M, make_bench
 
 
@@ -86,7 +87,12 @@ def test_a_lost_target_stops_the_arm_first_and_the_run_later(tmp_path: Path, fau
     else:
         bench.vision.frozen_from_s = 2.0
     outcome = bench.loop.run()
-    assert outcome.ending is Ending.TARGET_LOST
+    # Images without the target lose it; no images at all are the camera's failure.
+    if fault == "hidden":
+        assert outcome.ending is Ending.TARGET_LOST
+    else:
+        assert outcome.ending is Ending.DEVICE_FAILURE
+        assert "no image for 2.0" in str(outcome.error)
     safety = bench.config.safety
     # Within the age limit, the frame before it, and the ramp, the command is zero.
     ramp_s = 0.05 / safety.max_linear_acceleration_m_s2
@@ -123,11 +129,11 @@ def test_a_broken_camera_ends_the_run_with_the_arm_at_rest(tmp_path: Path) -> No
     assert_stopped(bench)
 
 
-def test_an_arm_that_stops_reporting_is_a_safety_stop(tmp_path: Path) -> None:
+def test_an_arm_that_stops_reporting_is_a_device_failure(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.arm.silent_from_s = 1.5
     outcome = bench.loop.run()
-    assert outcome.ending is Ending.SAFETY_STOP
+    assert outcome.ending is Ending.DEVICE_FAILURE
     limit_s = bench.config.safety.max_state_age_s
     assert max(t for t, twist in bench.arm.commands if np.any(twist)) < 1.5 + limit_s + 0.02
     assert_stopped(bench)
@@ -175,3 +181,92 @@ def test_the_same_run_writes_the_same_log(tmp_path: Path) -> None:
         logs.append((tmp_path / name / "log.jsonl").read_bytes())
     assert logs[0] == logs[1]
     assert len(logs[0]) > 100_000
+
+
+def events(run_dir: Path) -> list[tuple[str, str]]:
+    """The names and details of the log's events."""
+    lines = (run_dir / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    records = [json.loads(line) for line in lines]
+    return [(r["event"], r["detail"]) for r in records if r["kind"] == "event"]
+
+
+def test_the_log_tells_every_state_of_a_run(tmp_path: Path) -> None:
+    make_bench(tmp_path, ["run.duration_s=1"]).loop.run()
+    names = [name for name, _ in events(tmp_path) if name.startswith("state")]
+    assert names == ["state running", "state stopping", "state stopped"]
+
+
+def test_a_loop_held_up_holds_the_arm_and_starts_again_from_rest(tmp_path: Path) -> None:
+    hung: list[float] = []
+
+    def hang(status: LiveStatus) -> None:
+        if status.elapsed_s > 1.0 and not hung:
+            hung.append(bench.clock.now_s())
+            bench.clock.sleep_until(hung[0] + 0.5)
+
+    bench = make_bench(tmp_path, ["run.duration_s=3"], on_tick=hang)
+    outcome = bench.loop.run()
+    assert outcome.ending is Ending.TIME
+    assert outcome.holds == 1
+    assert "held up" in outcome.last_hold
+    after = [twist for t, twist in bench.arm.commands if t > hung[0] + 0.1]
+    limit = bench.config.safety.max_linear_acceleration_m_s2
+    assert np.linalg.norm(after[1][:3]) <= 2 * limit * 0.01 * (1 + 1e-6)
+
+
+def test_a_wall_in_the_way_holds_the_arm_and_keeps_the_measurement(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=6", "safety.workspace_min_m=[-0.12,-2,0.05]"])
+    outcome = bench.loop.run()
+    assert outcome.ending is Ending.TIME
+    assert outcome.holds == 1
+    assert "workspace x min" in outcome.last_hold
+    assert min(s.T_base_tool[0, 3] for s in bench.arm.history) > -0.12
+    assert bench.arm.history[-1].T_base_tool[0, 3] < -0.11
+    assert bench.data.updates[-1].radius_m == pytest.approx(RADIUS_M, rel=0.02)
+
+
+def test_a_wall_ends_the_run_where_that_is_wanted(tmp_path: Path) -> None:
+    wall = ["safety.workspace_min_m=[-0.05,-2,0.05]", "safety.reactions.envelope=stop"]
+    bench = make_bench(tmp_path, wall)
+    outcome = bench.loop.run()
+    assert outcome.ending is Ending.SAFETY_STOP
+    assert "workspace x min" in str(outcome.error)
+    assert ("state fault", str(outcome.error)) in events(tmp_path)
+    assert_stopped(bench)
+
+
+def test_an_estimate_that_images_contradict_stops_the_run(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=9", "safety.max_residual=1e-9"])
+    outcome = bench.loop.run()
+    assert outcome.ending is Ending.SAFETY_STOP
+    assert "diverged" in str(outcome.error)
+    assert_stopped(bench)
+
+
+def test_a_camera_that_pauses_is_waited_for(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=5"])
+    bench.vision.frozen_from_s = 2.0
+    resumed = False
+
+    def resume(status: LiveStatus) -> None:
+        nonlocal resumed
+        if bench.clock.now_s() > 3.0 and not resumed:
+            resumed, bench.vision.frozen_from_s = True, np.inf
+            bench.vision.seq = int(bench.clock.now_s() * 30)
+
+    bench.loop._on_tick = resume
+    outcome = bench.loop.run()
+    assert outcome.ending is Ending.TIME
+    assert outcome.holds == 1
+    assert "no image" in outcome.last_hold
+    resting = [twist for t, twist in bench.arm.commands if 2.5 < t < 3.0]
+    assert resting
+    assert not np.any(resting)
+    assert bench.data.updates[-1].radius_m == pytest.approx(RADIUS_M, rel=5e-3)
+
+
+def test_a_held_arm_does_not_unsettle_what_has_settled(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=9", "safety.workspace_min_m=[-0.25,-2,0.05]"])
+    outcome = bench.loop.run()
+    assert outcome.holds == 1
+    assert outcome.remaining_fraction < 5e-3
