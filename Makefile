@@ -27,6 +27,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.bench_camera
 	$(BIN)/python -m benchmarks.bench_ur
 	$(BIN)/python -m benchmarks.bench_grbl
+	$(BIN)/python -m benchmarks.bench_lateness
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -5,8 +5,9 @@ Conventions: SI units; ``T_base_tool`` maps tool coordinates into base coordinat
 instants are seconds on the rig's one ``Clock``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,22 @@ class ArmState:
     t_s: float  # the instant the sample was true
     T_base_tool: FloatArray  # (4, 4)
     twist_tool: FloatArray  # (6,) measured, in the tool's own axes
+    # Standard deviations of ``t_s`` and of ``twist_tool`` (6,), None where nobody knows them.
+    t_std_s: float | None = None
+    twist_std: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Joints:
+    """Where the joints are, where they may go, and how they move the tool; n joints."""
+
+    names: tuple[str, ...]
+    q: FloatArray  # (n,) m for slides, rad for rotations
+    low: FloatArray  # (n,)
+    high: FloatArray  # (n,)
+    linear: tuple[bool, ...]  # whether each is a slide
+    # Maps q (n,) to J (6, n): twist_tool = J q̇, in the tool's own axes.
+    jacobian: Callable[[FloatArray], FloatArray]
 
 
 class Camera(Protocol):
@@ -74,4 +91,13 @@ class Arm(Protocol):
 
     def close(self) -> None:
         """Stop and release the device; harmless when repeated."""
+        ...
+
+
+@runtime_checkable
+class JointArm(Protocol):
+    """What an arm that knows its joints offers besides ``Arm``."""
+
+    def joints(self) -> Joints | None:
+        """The joints at the newest sample; None before the first, or for an unknown model."""
         ...

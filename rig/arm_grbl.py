@@ -7,8 +7,9 @@ from drivers.clock import Clock
 from drivers.errors import ConfigError, DeviceTimeoutError, OperateError
 from drivers.grbl.arm import GrblArm
 from drivers.grbl.settings import GrblSettings
+from drivers.grbl.timing import GrblTiming
 from drivers.interfaces import Arm, ArmState
-from rig.arm_kits import Address, Json
+from rig.arm_kits import Address, Json, own_settings
 
 _FIRST_STATE_S = 2.0
 _POLL_S = 0.02
@@ -21,11 +22,11 @@ class GrblKit:
     max_state_age_s = 0.3
 
     def __init__(self, address: Address) -> None:
-        if address.port is None:
+        settings = own_settings(address, GrblSettings)
+        if "port" not in settings:
             raise ConfigError("--arm grbl needs --port: the gantry's serial device")
-        given = {"port": address.port, "baud": address.baud}
-        known = {name: value for name, value in given.items() if value is not None}
-        self._settings = GrblSettings.model_validate(known)
+        # None of the commands expects a move of its own accord.
+        self._settings = GrblSettings.model_validate({**settings, "self_test_mm": 0.0})
 
     def open(self, clock: Clock) -> Arm:
         """Open the port and ask the controller about itself."""
@@ -37,14 +38,17 @@ class GrblKit:
         try:
             problem: str | None = None
             state: ArmState | None = None
+            timing: dict[str, Json] = {}
             try:
                 state = _first_state(arm, clock)
+                timing = _timing_facts(arm.timing)
             except OperateError as error:
                 problem = str(error)
             return {
                 "controller": self._settings.port,
                 "state": arm.explain(),
                 "tool_position_m": None if state is None else state.T_base_tool[:3, 3].tolist(),
+                **timing,
                 "problem": problem,
             }
         finally:
@@ -71,6 +75,29 @@ class GrblKit:
         finally:
             arm.close()
         return f"the gantry at {self._settings.port} takes commands again; it did not move"
+
+    def home(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
+        """Run the controller's homing cycle after asking; every axis moves."""
+        arm = GrblArm(self._settings, clock)
+        try:
+            with contextlib.suppress(OperateError):
+                _first_state(arm, clock)
+            arm.home(confirm)
+            tool_m = _first_state(arm, clock).T_base_tool[:3, 3]
+        finally:
+            arm.close()
+        where = ", ".join(f"{value:.4f}" for value in tool_m)
+        return f"the gantry at {self._settings.port} is homed; its tool is at ({where}) m"
+
+
+def _timing_facts(timing: GrblTiming) -> dict[str, Json]:
+    return {
+        "round_trip_s": timing.round_trip_s,
+        "state_age_s": timing.state_age_s,
+        "command_delay_s": timing.command_delay_s,
+        "command_delay_measured": timing.command_delay_measured,
+        "bandwidth_hz": timing.bandwidth_hz,
+    }
 
 
 def _first_state(arm: Arm, clock: Clock) -> ArmState:

@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
+
+from pydantic import BaseModel
 
 from drivers.clock import Clock
 from drivers.errors import ConfigError
@@ -19,6 +21,8 @@ class Address:
     host: str | None = None
     port: str | None = None
     baud: int | None = None
+    # A rig file's arm section: axes and kinematics that its workspace is meant for.
+    settings: BaseModel | None = None
 
 
 class ArmKit(Protocol):
@@ -43,12 +47,28 @@ class ArmKit(Protocol):
         """Bring a stopped arm back after asking; says what was done. Nothing moves."""
         ...
 
+    def home(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
+        """Let the arm find its zero after asking; it moves. Says what was done.
+
+        Raises ConfigError for an arm that has no such thing.
+        """
+        ...
+
 
 _KITS = {
     "sim": "rig.arm_sim:SimKit",
     "ur": "rig.arm_ur:UrKit",
     "grbl": "rig.arm_grbl:GrblKit",
 }
+
+
+def own_settings(address: Address, kind: type[BaseModel]) -> dict[str, Any]:
+    """The driver's keys of the rig file, with the command line's address laid over them."""
+    given = {"host": address.host, "port": address.port, "baud": address.baud}
+    known = {k: v for k, v in given.items() if v is not None and k in kind.model_fields}
+    if not isinstance(address.settings, kind):
+        return known
+    return {**address.settings.model_dump(include=set(kind.model_fields)), **known}
 
 
 def arm_kit(name: str, address: Address) -> ArmKit:

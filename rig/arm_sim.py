@@ -40,3 +40,7 @@ class SimKit:
     def recover(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
         """Nothing to recover from."""
         return "the simulated arm is always ready"
+
+    def home(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
+        """Nothing to find."""
+        return "the simulated arm always knows where it is"

@@ -11,7 +11,7 @@ from drivers.ur.arm import UrArm
 from drivers.ur.recovery import recover_controller, stop_controller
 from drivers.ur.settings import UrSettings
 from drivers.ur.status import read_status
-from rig.arm_kits import Address, Json
+from rig.arm_kits import Address, Json, own_settings
 
 
 class UrKit:
@@ -20,9 +20,10 @@ class UrKit:
     max_state_age_s = 0.1
 
     def __init__(self, address: Address) -> None:
-        if address.host is None:
+        settings = own_settings(address, UrSettings)
+        if "host" not in settings:
             raise ConfigError("--arm ur needs --host: the controller's address")
-        self._settings = UrSettings(host=address.host)
+        self._settings = UrSettings.model_validate(settings)
 
     def open(self, clock: Clock) -> Arm:
         """Connect, upload the control program, arm its watchdog."""
@@ -66,3 +67,10 @@ class UrKit:
         finally:
             arm.close()
         return f"the arm at {self._settings.host} takes commands again; it did not move"
+
+    def home(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
+        """Refuse."""
+        raise ConfigError(
+            "a UR arm knows where its joints are when it is switched on: there is nothing to "
+            "home, and nothing moved"
+        )

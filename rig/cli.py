@@ -6,12 +6,16 @@ import typer
 
 from drivers.errors import RigError
 from rig.commands.arm import arm_app
+from rig.commands.calibrate import calibrate_app
 from rig.commands.camera import camera_app
+from rig.commands.doctor import EXIT_CODES as DOCTOR_EXIT_CODES
+from rig.commands.doctor import doctor
 from rig.commands.measure import measure
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
 from rig.commands.sim import sim_app
 from rig.exit_codes import HELP, ExitCode, exit_code_of
+from rig.output import patient_output
 
 app = typer.Typer(
     name="rig",
@@ -25,6 +29,8 @@ app = typer.Typer(
 app.command(epilog=HELP)(run)
 app.command()(measure)
 app.command(epilog=HELP)(reproduce)
+app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
+app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")
 app.add_typer(arm_app, name="arm")
 app.add_typer(sim_app, name="sim")
@@ -32,10 +38,11 @@ app.add_typer(sim_app, name="sim")
 
 def main() -> None:
     """Run the command line; an error of the rig is one line on stderr and an exit status."""
-    try:
-        app()
-    except RigError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(exit_code_of(error))
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+    with patient_output():
+        try:
+            app()
+        except RigError as error:
+            print(f"error: {error}", file=sys.stderr)
+            sys.exit(exit_code_of(error))
+        except KeyboardInterrupt:
+            sys.exit(ExitCode.INTERRUPTED)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimator.gain import damping_rates
+from estimator.gain import REST_SIGMA, damping_rates
 from estimator.second_order import exact_step
 from rig.config import RigConfig
 from rig.run_data import RunData
@@ -24,6 +24,7 @@ class Convergence:
         self._data = data
         self._used = 0
         self._z, self._w = 1.0, 0.0
+        self._standing = 0  # images in a row
         self.remaining_fraction = 1.0
 
     def update(self) -> None:
@@ -50,5 +51,10 @@ class Convergence:
         z, w = self._z, self._w
         self._z = float(step.zz * z + step.zw * w)
         self._w = float(step.wz * z + step.ww * w)
+        # The observer holds its estimate for a standing camera, see ``rest_rates``; one that
+        # merely reverses stands for less than two images.
+        self._standing = self._standing + 1 if sigma2 < REST_SIGMA**2 else 0
+        if self._standing >= 2:
+            self._w = 0.0
         kinetic = alpha * self._w**2 / sigma2 if sigma2 > 0 else 0.0
         self.remaining_fraction = min(1.0, float(np.sqrt(self._z**2 + kinetic)))

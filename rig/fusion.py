@@ -1,12 +1,13 @@
 """Arm samples and sightings in, the newest estimate out: each image used at its own instant."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import SafetyError
-from drivers.interfaces import ArmState
+from drivers.interfaces import ArmState, Frame
 from estimator.estimate import Correction, Estimate, Estimator
 from estimator.twist_history import MotionUnknownError, TwistHistory
 from rig.records import RunLog
@@ -15,22 +16,37 @@ from rig.vision import Sighting
 
 FloatArray = NDArray[np.float64]
 
+_PERIODS = 15  # the camera's period is the median over this many
+
 
 class Fusion:
-    """Keeps the estimator's state at the last image's exposure and predicts from there to now."""
+    """Keeps the estimator's state at the last image's exposure and predicts from there to now.
+
+    Images were exposed ``stamps_late_s`` before their stamps, as the calibration found.
+    """
 
     def __init__(
-        self, estimator: Estimator, data: RunData, log: RunLog, max_extrapolation_s: float
+        self,
+        estimator: Estimator,
+        data: RunData,
+        log: RunLog,
+        max_extrapolation_s: float,
+        stamps_late_s: float = 0.0,
     ) -> None:
         self._estimator = estimator
         self._camera_from_tool = data.camera_from_tool
         self._motion = TwistHistory(max_extrapolation_s=max_extrapolation_s)
         self._data = data
         self._log = log
+        self._stamps_late_s = stamps_late_s
         # Sightings wait here until the arm has reported the motion up to their exposure.
         self._waiting: deque[Sighting] = deque()
+        self._periods_s: deque[float] = deque(maxlen=_PERIODS)
+        self._newest_image: tuple[int, float] | None = None  # seq and exposure instant
         self.state: ArmState | None = None
-        self.last_feature_s: float | None = None
+        self.last_image_s: float | None = None  # when the newest image was handled
+        self.last_feature_s: float | None = None  # when the newest one used was exposed
+        self.target_in_newest = False
         self.reason = "no image arrived yet"
 
     def add_states(self, states: list[ArmState]) -> None:
@@ -48,9 +64,12 @@ class Fusion:
         """Record sightings; those with a feature will correct the estimate."""
         for sighting in sightings:
             self._data.add_frame(sighting.frame.seq, sighting.measurement.found)
+            self._note_period(sighting.frame)
+            self.last_image_s = now_s
             self._log.frame(sighting, now_s)
+            self.target_in_newest = sighting.measurement.found
             if sighting.measurement.found:
-                self._waiting.append(sighting)
+                self._waiting.append(self._corrected(sighting))
             else:
                 self.reason = sighting.measurement.reason
 
@@ -76,6 +95,29 @@ class Fusion:
         if self.state is None:
             return 0.0
         return float(np.linalg.norm((self._camera_from_tool @ self.state.twist_tool)[:3]))
+
+    @property
+    def newest_update(self) -> Estimate | None:
+        """The state after the last image used; None before the first."""
+        return self._data.updates[-1] if self._data.updates else None
+
+    @property
+    def image_period_s(self) -> float | None:
+        """The camera's period as its stamps show it, drops left aside; None: not known yet."""
+        return float(np.median(self._periods_s)) if self._periods_s else None
+
+    def _corrected(self, sighting: Sighting) -> Sighting:
+        frame = sighting.frame
+        t_s = frame.t_exposure_mid_s - self._stamps_late_s
+        return replace(sighting, frame=replace(frame, t_exposure_mid_s=t_s))
+
+    def _note_period(self, frame: Frame) -> None:
+        seq, t_s = frame.seq, frame.t_exposure_mid_s
+        if self._newest_image is not None and seq > self._newest_image[0]:
+            passed_s = t_s - self._newest_image[1]
+            if passed_s > 0.0:
+                self._periods_s.append(passed_s / (seq - self._newest_image[0]))
+        self._newest_image = (seq, t_s)
 
     def _covered(self, t_s: float) -> bool:
         return self.state is not None and self.state.t_s >= t_s

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from rig.loop import LiveStatus
+from rig.outcome import LiveStatus
 
 _REFRESH_S = 0.1
 _LINE_EVERY_S = 1.0
@@ -145,6 +145,7 @@ def rows(status: LiveStatus, rates: Rates) -> list[tuple[str, str]]:
         ("camera", f"{rates.camera_fps:.1f} fps ({status.frames_lost} lost)"),
         ("loop", f"{rates.loop_hz:.1f} Hz ({status.overruns} overruns)"),
         ("speed", f"{status.speed_m_s * 1e3:.1f} mm/s"),
+        ("state", status.state),
         ("limited by", ", ".join(status.limited_by) or "nothing"),
         ("target", status.target_state),
     ]

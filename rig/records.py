@@ -12,6 +12,7 @@ from drivers.clock import local_timestamp
 from drivers.errors import ConfigError
 from drivers.interfaces import ArmState
 from estimator.estimate import Estimate
+from rig.background_file import BackgroundFile
 from rig.config import RigConfig, TargetKind
 from rig.config_load import dump_config
 from rig.vision import Sighting
@@ -20,6 +21,9 @@ Json = float | int | str | bool | None | Sequence["Json"] | Mapping[str, "Json"]
 
 LOG_NAME = "log.jsonl"
 SUMMARY_NAME = "summary.json"
+
+# One for all lines: json.dumps with options would make an encoder for each.
+_encode = json.JSONEncoder(allow_nan=False, check_circular=False).encode
 
 
 def make_run_dir(out: Path | None, target: TargetKind) -> Path:
@@ -61,12 +65,16 @@ class RunLog:
     """Writes one JSON object a line, each with ``kind`` and the instant ``t_s`` it was true.
 
     Every value comes from the run's clock and devices, so that on simulated time the same seed
-    writes the same bytes.
+    writes the same bytes. ``in_background`` leaves the disk to a thread, for the wall clock.
     """
 
-    def __init__(self, run_dir: Path, config: RigConfig) -> None:
+    def __init__(self, run_dir: Path, config: RigConfig, in_background: bool = False) -> None:
         (run_dir / "config.yaml").write_text(dump_config(config), encoding="utf-8")
-        self._file: IO[str] = (run_dir / LOG_NAME).open("w", encoding="utf-8")
+        file = (run_dir / LOG_NAME).open("w", encoding="utf-8")
+        self._file: IO[str] | BackgroundFile = BackgroundFile(file) if in_background else file
+
+        self._t_std_s: float | None = None
+        self._twist_std: np.ndarray | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -80,12 +88,21 @@ class RunLog:
         self._file.close()
 
     def arm(self, state: ArmState) -> None:
-        """One measured arm sample; the pose as the upper three rows of ``T_base_tool``."""
+        """One measured arm sample; the pose as the upper three rows of ``T_base_tool``.
+
+        Its uncertainties are written where the arm knows them, and only when they changed.
+        """
+        known: dict[str, Json] = {}
+        if state.t_std_s is not None and state.t_std_s != self._t_std_s:
+            known["t_std_s"] = self._t_std_s = state.t_std_s
+        if state.twist_std is not None and state.twist_std is not self._twist_std:
+            known["twist_std"], self._twist_std = state.twist_std.tolist(), state.twist_std
         self._write(
             "arm",
             state.t_s,
             T_base_tool=state.T_base_tool[:3].tolist(),
             twist_tool=state.twist_tool.tolist(),
+            **known,
         )
 
     def frame(self, sighting: Sighting, handled_s: float) -> None:
@@ -142,7 +159,7 @@ class RunLog:
         self._file.flush()
 
     def _write(self, kind: str, t_s: float, **values: Json) -> None:
-        self._file.write(json.dumps({"kind": kind, "t_s": t_s, **values}, allow_nan=False) + "\n")
+        self._file.write(_encode({"kind": kind, "t_s": t_s, **values}) + "\n")
 
 
 def write_summary(run_dir: Path, summary: Mapping[str, Json]) -> None:

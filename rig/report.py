@@ -17,6 +17,14 @@ from rig.analysis import Analysis
 from rig.run_data import RunData, Snapshot
 
 MEASURED, IDEAL = "#1f5fa8", "black"
+_MARGINS = {
+    "left": 0.07,
+    "right": 0.985,
+    "bottom": 0.06,
+    "top": 0.91,
+    "wspace": 0.28,
+    "hspace": 0.25,
+}
 _AXIS_SHOWN_M = 0.12  # half the length drawn of a cylinder's axis
 
 
@@ -24,9 +32,10 @@ def write_report(
     path: Path, title: str, analysis: Analysis, data: RunData, intrinsics: Intrinsics
 ) -> None:
     """Draw all panels of one run into ``path`` (PNG)."""
-    figure = plt.figure(figsize=(15, 9), layout="constrained")
+    figure = plt.figure(figsize=(15, 9))
     figure.suptitle(title)
-    grid = figure.add_gridspec(2, 3)
+    # Fixed margins: a layout that fits itself draws everything twice.
+    grid = figure.add_gridspec(2, 3, **_MARGINS)
     draw_transient(figure.add_subplot(grid[0, 0]), analysis)
     draw_sigma2(figure.add_subplot(grid[0, 1]), analysis)
     draw_speed2(figure.add_subplot(grid[0, 2]), analysis)

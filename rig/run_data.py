@@ -1,5 +1,6 @@
 """A run as arrays: what the summary and the report are computed from."""
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,7 +87,9 @@ class RunData:
     def sigma2_at(self, index: int) -> float:
         """σ1² of the measured motion at the time of ``updates[index]``, (m/s)²."""
         update = self.updates[index]
-        nearest = min(reversed(self.arm_states[-200:]), key=lambda s: abs(s.t_s - update.t_s))
+        states = self.arm_states
+        after = min(bisect_left(states, update.t_s, key=lambda s: s.t_s), len(states) - 1)
+        nearest = min(states[max(after - 1, 0) : after + 1], key=lambda s: abs(s.t_s - update.t_s))
         v = (self.camera_from_tool @ nearest.twist_tool)[:3]
         along = 0.0 if update.axis is None else float(update.axis @ v)
         return max(float(v @ v) - along**2, 0.0)

@@ -16,10 +16,19 @@ class TickStats:
     ticks: int = 0
     overruns: int = 0  # grid points skipped because the tick before took too long
     late_s: list[float] = field(default_factory=list)  # start of each tick after its grid point
+    scheduling: str = "simulated time"  # or how the system schedules: "normal", "realtime"
 
     def late_p99_s(self) -> float:
         """The 99th percentile of the lateness, 0 before the first tick."""
         return float(np.percentile(self.late_s, 99)) if self.late_s else 0.0
+
+    def late_median_s(self) -> float:
+        """The median of the lateness, 0 before the first tick."""
+        return float(np.median(self.late_s)) if self.late_s else 0.0
+
+    def late_max_s(self) -> float:
+        """The greatest lateness, 0 before the first tick."""
+        return max(self.late_s, default=0.0)
 
     def rate_hz(self, over_s: float) -> float:
         """Mean tick rate over a time span."""

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from rig.analysis import Analysis
 from rig.config import RigConfig, TargetKind
-from rig.loop import Ending, RunOutcome
+from rig.outcome import Ending, RunOutcome
 from rig.records import Json
 
 # What `rig run --json` prints, in this order; summary.json holds more.
@@ -76,9 +76,14 @@ def summarise(
         "ending": outcome.ending.value,
         "error": None if outcome.error is None else str(outcome.error),
         "target_state": outcome.target_state,
+        "holds": outcome.holds,
+        "last_hold": outcome.last_hold,
         "arm_at_rest": outcome.at_rest,
         "frames_dropped": outcome.data.frames_dropped,
         "transient_left": outcome.remaining_fraction,
+        "scheduling": outcome.stats.scheduling,
+        "tick_late_median_s": outcome.stats.late_median_s(),
+        "tick_late_max_s": outcome.stats.late_max_s(),
         "target_base_m": position,
     }
 
@@ -105,6 +110,7 @@ def table(summary: Mapping[str, Json]) -> Table:
         ),
         ("ticks", f"{summary['ticks']}, {summary['overruns']} overruns"),
         ("tick lateness, 99 %", _number(summary["tick_late_p99_s"], "{:.3f} ms", 1e3)),
+        ("scheduling", str(summary["scheduling"])),
         (
             "time",
             f"{_number(summary['sim_s'], '{:.2f} s')} of the rig in "

@@ -1,5 +1,7 @@
 """The serial gantry as an ``Arm``: a thread that keeps its core and its port talking."""
 
+import contextlib
+import os
 import threading
 from collections.abc import Callable
 
@@ -16,13 +18,14 @@ from drivers.grbl.selftest import measure_delay
 from drivers.grbl.session import Session
 from drivers.grbl.settings import GrblSettings
 from drivers.grbl.timing import GrblTiming
-from drivers.interfaces import ArmState
+from drivers.interfaces import ArmState, Joints
 
 FloatArray = NDArray[np.float64]
 
 _LOOK_S = 0.002
 _CLOSE_WAIT_S = 1.5
 _JOIN_S = 1.0
+_PRIORITY = 10
 
 
 class GrblArm:
@@ -84,6 +87,11 @@ class GrblArm:
         with self._lock:
             return self._connected().core.take_states()
 
+    def joints(self) -> Joints | None:
+        """The joints at the newest report; None before the first."""
+        with self._lock:
+            return self._connected().core.joints()
+
     def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
         """Follow ``twist_tool`` (6,) from now on; ``hold_s`` later the jog is cancelled.
 
@@ -109,11 +117,15 @@ class GrblArm:
             raise OperateError("the gantry was left as it is: its recovery was not confirmed")
         self._restart(recovery.unlock)
 
-    def home(self) -> None:
-        """Run the controller's homing cycle, which moves the gantry; unlocks it too.
+    def home(self, confirm: Callable[[str], bool]) -> None:
+        """Explain, ask, then run the homing cycle, which moves every axis; unlocks it too.
 
-        Raises ConnectError or OperateError.
+        Nothing moves unless ``confirm`` returns True. Raises ConnectError or OperateError where
+        that is not wanted or does not succeed.
         """
+        explained = f"{self.explain()} Homing drives every axis to its switch, at the controller's"
+        if not confirm(f"{explained} own speeds and past this program's limits."):
+            raise OperateError("the gantry was not homed: it was not confirmed, nothing moved")
         self._restart(recovery.home)
 
     def close(self) -> None:
@@ -157,6 +169,9 @@ class GrblArm:
 
     def _talk(self, session: Session) -> None:
         """The thread: bytes in, core, bytes out, until told to end or the line fails."""
+        # Little work that must not wait; where the system does not grant it, it goes on without.
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(_PRIORITY))
         try:
             while not self._ending.is_set():
                 data = self._link.read(_LOOK_S)

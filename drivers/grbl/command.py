@@ -10,6 +10,7 @@ from drivers.grbl.errors import LimitError, MotionError
 from drivers.grbl.kinematics import GantryKinematics
 from drivers.grbl.limits import AxisLimits
 from drivers.grbl.settings import AxisSettings, GrblSettings
+from drivers.interfaces import Joints
 
 FloatArray = NDArray[np.float64]
 
@@ -65,6 +66,14 @@ class Commander:
         if blocked is not None:
             raise LimitError(f"the gantry stopped: axis {blocked}; command a motion away from it")
         self._twist, self._expires_s, self._planned_for = twist, now_s + hold_s, None
+
+    def joints_at(self, mpos: FloatArray) -> Joints:
+        """The joints at machine coordinates ``mpos`` (n,), with the configured ranges."""
+        kinematics = self._kinematics
+        ends = np.sort([kinematics.joints(end) for end in (self._limits.low, self._limits.high)], 0)
+        linear = tuple(name in ("x", "y", "z") for name in kinematics.names)
+        q = kinematics.joints(mpos)
+        return Joints(kinematics.names, q, ends[0], ends[1], linear, kinematics.tool_jacobian)
 
     def clear(self) -> None:
         """Forget the command: rest."""

@@ -4,6 +4,7 @@ Every method takes the present instant; nothing here waits. ``receive`` what the
 write what ``transmit`` returns, as often as convenient (every 2 ms is plenty).
 """
 
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -30,7 +31,8 @@ from drivers.grbl.protocol import (
 )
 from drivers.grbl.settings import AxisSettings, GrblSettings
 from drivers.grbl.stream import JogStream
-from drivers.interfaces import ArmState
+from drivers.grbl.timing import stamp_std_s
+from drivers.interfaces import ArmState, Joints
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +77,8 @@ class Core:
         # A further line fits while the unacknowledged ones leave it room, at the longest.
         most = min(settings.max_ahead_bytes, controller.rx_bytes)
         self._ahead_bytes = max(most - longest_line_bytes(len(axes)), 1)
-        self._meter = MotionMeter(kinematics, settings.twist_window_s)
+        step, stamp_s = 1.0 / controller.steps_per_unit, stamp_std_s(controller)
+        self._meter = MotionMeter(kinematics, settings.twist_window_s, step, stamp_s)
         self._reader = LineReader(settings.baud)
         self._polling = Polling(settings.poll_hz, settings.silence_s, now_s)
         self._mode = _Mode.SETTLE  # the first thing to know is where it stands
@@ -95,6 +98,12 @@ class Core:
         """The states measured since the last call."""
         taken, self._states = self._states, []
         return taken
+
+    def joints(self) -> Joints | None:
+        """The joints at the newest report; None before the first."""
+        if self.status is None or self.status.position is None:
+            return None
+        return self._commander.joints_at(self._controller.pick(self.status.position))
 
     def command(self, twist_tool: FloatArray, hold_s: float, now_s: float) -> None:
         """Follow ``twist_tool`` (6,) until ``hold_s`` after ``now_s``.
@@ -161,6 +170,8 @@ class Core:
                     self.fail(faults.from_message(message, self._settings.port))
 
     def _take_status(self, status: Status, true_s: float, now_s: float) -> None:
+        if status.homed is None and self.status is not None:
+            status = replace(status, homed=self.status.homed)
         if status.position is None or len(status.position) <= max(self._controller.columns):
             return
         self.status = status

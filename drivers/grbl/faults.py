@@ -6,6 +6,9 @@ from drivers.grbl.protocol import AlarmMessage, Banner, Refusal, Status
 from drivers.grbl.words import alarm_words, door_words, error_words, pin_words
 
 _RECOVER = "then `rig arm recover --arm grbl --port {port}`"
+_HOME = "then `rig arm home --arm grbl --port {port}`, or `rig arm recover` to unlock it as it is"
+# Alarms after which the axes may no longer be where they are counted to be.
+_LOST = (1, 3, 6, 7, 8, 9, 11, None)
 
 
 def from_message(message: Refusal | AlarmMessage | Banner, port: str) -> RigError:
@@ -16,7 +19,7 @@ def from_message(message: Refusal | AlarmMessage | Banner, port: str) -> RigErro
         case Refusal(code):
             return RefusedError(f"{where} refused a jog: {error_words(code)}; see to it, {after}")
         case AlarmMessage(code):
-            return AlarmError(f"{where} stopped: {alarm_words(code)}; {after}")
+            return AlarmError(f"{where} stopped: {alarm_words(code)}; {_after(code, port)}")
         case Banner():
             return ResetError(
                 f"{where} was reset while in use; its position may be lost: home it, {after}"
@@ -34,7 +37,8 @@ def from_status(status: Status, port: str, stopping: bool) -> RigError | None:
         case "Idle" | "Jog":
             return None
         case "Alarm":
-            return AlarmError(f"{where} is locked: {alarm_words(status.part)}{pins}; {after}")
+            what = f"{where} is locked: {alarm_words(status.part)}{pins}"
+            return AlarmError(f"{what}; {_after(status.part, port)}")
         case "Door":
             return HeldError(f"{where} holds: {door_words(status.part)}{pins}; close it, {after}")
         case "Hold":
@@ -50,6 +54,10 @@ def from_status(status: Status, port: str, stopping: bool) -> RigError | None:
                 f"{where} is busy (state {status.state}): another program moves or tests it; "
                 f"end that, {after}"
             )
+
+
+def _after(alarm: int | None, port: str) -> str:
+    return (_HOME if alarm in _LOST else _RECOVER).format(port=port)
 
 
 def no_rest(status: Status, port: str) -> RigError:

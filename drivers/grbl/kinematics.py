@@ -75,6 +75,17 @@ class GantryKinematics:
         R = R_wrist @ self._R_tool
         return np.concatenate([R.T @ v, R.T @ w])
 
+    def tool_jacobian(self, q: FloatArray) -> FloatArray:
+        """J (6, n) with tool_twist(q, qd) = J @ qd."""
+        R_wrist, axes = self._wrist(q)
+        R_tool_base = (R_wrist @ self._R_tool).T
+        arm = R_wrist @ self._tool_xyz
+        J = np.zeros((6, len(q)))
+        J[:3, self._slides] = R_tool_base
+        J[:3, self._turns] = R_tool_base @ (-_skew(arm) @ axes)
+        J[3:, self._turns] = R_tool_base @ axes
+        return J
+
     def joint_rates(self, q: FloatArray, twist_tool: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint velocities (n,) for ``twist_tool`` (6,), and the rotation (3,) they leave out.
 

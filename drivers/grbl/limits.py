@@ -23,7 +23,7 @@ class AxisLimits:
         self._names = [f"{axis.letter} ({axis.joint})" for axis in axes]
         low = [-math.inf if axis.mpos_min is None else axis.mpos_min for axis in axes]
         high = [math.inf if axis.mpos_max is None else axis.mpos_max for axis in axes]
-        self._low, self._high = np.array(low), np.array(high)
+        self.low, self.high = np.array(low), np.array(high)  # (n,) machine coordinates
         self._max_rate = controller.max_rate
         self._acceleration = controller.acceleration
 
@@ -47,13 +47,13 @@ class AxisLimits:
         axis = int(np.argmin(left / np.maximum(np.abs(rates), 1e-12)))
         if left[axis] > _APPROACH_S * self._max_rate[axis]:
             return None  # slow for its speed alone
-        end = self._high[axis] if rates[axis] > 0.0 else self._low[axis]
+        end = self.high[axis] if rates[axis] > 0.0 else self.low[axis]
         return f"{self._names[axis]} is at the end of its range, {end:g} in machine coordinates"
 
     def _left(self, position: FloatArray, rates: FloatArray) -> FloatArray:
         left: FloatArray = np.where(
             rates > 0.0,
-            self._high - position,
-            np.where(rates < 0.0, position - self._low, math.inf),
+            self.high - position,
+            np.where(rates < 0.0, position - self.low, math.inf),
         )
         return left

@@ -1,11 +1,13 @@
 """From reported positions to measured motion: a straight line through the last reports."""
 
+import math
 from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.grbl.kinematics import GantryKinematics
+from drivers.grbl.timing import rate_std
 from drivers.interfaces import ArmState
 
 FloatArray = NDArray[np.float64]
@@ -21,11 +23,19 @@ class MotionMeter:
     The controller reports no velocity (its FS leads the motion), so velocity is the slope of
     the positions over a window. A slope is the mean over its window: the state belongs to
     the window's middle, pose and twist alike, and is therefore half a window old when born.
+
+    ``step`` (n,) is what the machine positions are rounded to, ``stamp_std_s`` the standard
+    deviation of their instants; each state carries what follows from them.
     """
 
-    def __init__(self, kinematics: GantryKinematics, window_s: float) -> None:
+    def __init__(
+        self, kinematics: GantryKinematics, window_s: float, step: FloatArray, stamp_std_s: float
+    ) -> None:
         self._kinematics = kinematics
         self._window_s = window_s
+        self._step = step
+        self._stamp_std_s = stamp_std_s
+        self._last_slope: FloatArray | None = None
         self._samples: deque[tuple[float, FloatArray]] = deque()
         self._last_s = float("-inf")
 
@@ -39,6 +49,7 @@ class MotionMeter:
         samples = self._samples
         if samples and t_s - samples[-1][0] > _LONGEST_GAP_S:
             samples.clear()
+            self._last_slope = None
         if samples and t_s <= samples[-1][0]:
             return None
         samples.append((t_s, mpos))
@@ -56,13 +67,28 @@ class MotionMeter:
         middle_s = float(np.mean(times))
         if middle_s <= self._last_s:
             return None
-        self._last_s = middle_s
         offsets = times - middle_s
         slope = offsets @ positions / float(offsets @ offsets)
         q = self._kinematics.joints(np.mean(positions, axis=0))
         qd = self._kinematics.joint_rates_of(slope)
-        return ArmState(
+        state = ArmState(
             t_s=middle_s,
             T_base_tool=self._kinematics.tool_pose(q),
             twist_tool=self._kinematics.tool_twist(q, qd),
+            t_std_s=self._stamp_std_s / math.sqrt(len(times)),
+            twist_std=self._twist_std(q, slope, middle_s, float(times[-1] - times[0])),
         )
+        self._last_s, self._last_slope = middle_s, slope
+        return state
+
+    def _twist_std(
+        self, q: FloatArray, slope: FloatArray, middle_s: float, window_s: float
+    ) -> FloatArray:
+        """Of the tool's twist (6,), the axes' errors taken as independent."""
+        change = np.zeros_like(slope)
+        if self._last_slope is not None:
+            change = (slope - self._last_slope) / (middle_s - self._last_s)
+        axes = rate_std(self._step, slope, change, self._stamp_std_s, window_s)
+        J = self._kinematics.tool_jacobian(q)
+        std: FloatArray = np.sqrt(J**2 @ self._kinematics.joint_rates_of(axes) ** 2)
+        return std

@@ -60,6 +60,7 @@ class Status:
     blocks_free: int | None
     bytes_free: int | None
     pins: str
+    homed: bool | None = None  # grblHAL says it now and then
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,10 @@ def _status(text: str) -> Status | None:
         return None  # damaged: a report without its position is worth nothing
     blocks, _, free = values.get("Bf", "").partition(",")
     part = None if match[2] is None else int(match[2])
-    return Status(match[1], part, position, _whole(blocks), _whole(free), values.get("Pn", ""))
+    homed = {"0": False, "1": True}.get(values.get("H", "").partition(",")[0])
+    return Status(
+        match[1], part, position, _whole(blocks), _whole(free), values.get("Pn", ""), homed
+    )
 
 
 def _whole(text: str) -> int | None:

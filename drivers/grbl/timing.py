@@ -3,14 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.grbl.controller import Controller
 from drivers.grbl.settings import GrblSettings
+
+FloatArray = NDArray[np.float64]
 
 # The firmware prepares ten segments of 10 ms: from leaving the planner to the motors it takes
 # 55 to 95 ms, measured. The claim is the slow end.
 _PREPARED_S = 0.095
 _PHASE_45_DEG = 0.125  # of a period
+_STAMP_FLOOR_S = 0.0003
+_SEGMENT_S = 0.010  # of the firmware's, measured
+_RIPPLE = (1.0 / 6.0) ** 0.5  # of a number of steps rounded at both ends of a segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,15 +41,38 @@ class GrblTiming:
         return _PHASE_45_DEG / self.command_delay_s
 
     def velocity_std_m_s(self, speed_m_s: float, acceleration_m_s2: float = 0.0) -> float:
-        """Standard deviation of a measured slide velocity.
+        """Standard deviation of a measured slide velocity."""
+        step_m, speed, change = np.array([self.position_step_m, speed_m_s, acceleration_m_s2])
+        return float(rate_std(step_m, speed, change, self.stamp_std_s, self.twist_window_s))
 
-        Steps and stamp errors at both ends of the window, and what the mean over the window
-        hides when the speed changes inside it.
-        """
-        end_m = np.hypot(self.position_step_m / np.sqrt(12.0), speed_m_s * self.stamp_std_s)
-        noise = np.sqrt(2.0) * end_m / self.twist_window_s
-        hidden = abs(acceleration_m_s2) * self.twist_window_s / np.sqrt(12.0)
-        return float(np.hypot(noise, hidden))
+
+def rate_std(
+    step: FloatArray,
+    rate: FloatArray,
+    acceleration: FloatArray,
+    stamp_std_s: float,
+    window_s: float,
+) -> FloatArray:
+    """Standard deviations of rates measured as slopes of positions over a window, elementwise.
+
+    Steps and stamp errors at both ends of the window, and what the mean over the window hides:
+    a rate that changes inside it, and the ripple of a firmware that makes whole steps in each
+    of its segments. In the units of ``step``, per second.
+    """
+    end = np.hypot(step / np.sqrt(12.0), rate * stamp_std_s)
+    hidden = np.abs(acceleration) * window_s / np.sqrt(12.0)
+    steps = np.abs(rate) * _SEGMENT_S / step  # in a segment
+    ripple = step / _SEGMENT_S * np.minimum(np.sqrt(steps), _RIPPLE)
+    std: FloatArray = np.sqrt(2.0 * (end / window_s) ** 2 + hidden**2 + ripple**2)
+    return std
+
+
+def stamp_std_s(controller: Controller) -> float:
+    """Standard deviation of a report's instant, from the round trips measured at start-up.
+
+    A late thread or an occupied line shifts stamps by about the spread of round trips.
+    """
+    return float(np.std(controller.round_trips_s)) + _STAMP_FLOOR_S
 
 
 def timing_of(
@@ -62,7 +91,6 @@ def timing_of(
         twist_window_s=settings.twist_window_s,
         state_age_s=0.5 * settings.twist_window_s + median_s,
         state_age_max_s=0.5 * settings.twist_window_s + float(trips.max()) + 0.05 + period_s,
-        # A late thread or an occupied line shifts stamps by about the spread of round trips.
-        stamp_std_s=float(np.std(trips)) + 0.0003,
+        stamp_std_s=stamp_std_s(controller),
         position_step_m=1e-3 / float(np.min(controller.steps_per_unit[:3])),
     )

@@ -1,4 +1,4 @@
-"""``rig arm``: look at an arm, jog it, stop it, bring it back; no rig file needed."""
+"""``rig arm``: look at an arm, jog it, stop it, bring it back, home it; no rig file needed."""
 
 import json
 from pathlib import Path
@@ -13,10 +13,12 @@ from rig.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from rig.arm_kits import ArmKit
-    from rig.config import SafetyConfig
+    from rig.config_safety import SafetyConfig
     from rig.jog import JogResult
 
-arm_app = typer.Typer(help="Look at an arm, jog it, stop it, bring it back.", no_args_is_help=True)
+arm_app = typer.Typer(
+    help="Look at an arm, jog it, stop it, bring it back, home it.", no_args_is_help=True
+)
 _FAR_M = 100.0
 
 ArmName = Annotated[
@@ -63,15 +65,15 @@ def jog(
 ) -> None:
     """Move the arm within the limits and report what it did; Ctrl-C stops it.
 
-    The limits are those of the rig file's `safety` section; without one its default speeds and
-    accelerations, and no workspace.
+    With a rig file the arm is set up as there, and the limits are those of its `safety` section;
+    without one, its default speeds and accelerations hold, and no workspace.
     """
     from drivers.clock import WallClock
     from rig.jog import jog as run_jog
     from rig.stop_request import StopRequest
 
     wanted = _numbers(twist)
-    kit = _kit(arm, host, port, baud)
+    kit = _kit(arm, host, port, baud, rig)
     safety = _limits(rig, kit.max_state_age_s)
     clock = WallClock()
     with StopRequest() as stop_requested:
@@ -115,16 +117,44 @@ def recover(
     print(_kit(arm, host, port, baud).recover(WallClock(), confirm))
 
 
-def _kit(arm: str, host: str | None, port: str | None, baud: int | None) -> "ArmKit":
-    from rig.arm_kits import Address, arm_kit
+@arm_app.command()
+def home(
+    arm: ArmName,
+    host: Host = None,
+    port: Port = None,
+    baud: Baud = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+) -> None:
+    """Let a gantry find its zero at its switches; every axis moves. Ctrl-C stops it at once.
 
-    return arm_kit(arm, Address(host, port, baud))
+    A program that is killed meanwhile cannot stop it: the controller then homes on by itself.
+    """
+    from drivers.clock import WallClock
+
+    def confirm(explanation: str) -> bool:
+        print(explanation)
+        return yes or typer.confirm("Is the whole way of every axis clear, and shall it move?")
+
+    print(_kit(arm, host, port, baud).home(WallClock(), confirm))
+
+
+def _kit(
+    arm: str, host: str | None, port: str | None, baud: int | None, rig: Path | None = None
+) -> "ArmKit":
+    from drivers.errors import ConfigError
+    from rig.arm_kits import Address, arm_kit
+    from rig.config_load import load_config
+
+    settings = None if rig is None else load_config("sphere", rig).arm
+    if settings is not None and settings.driver != arm:
+        raise ConfigError(f"--arm {arm}, but {rig} has arm.driver = {settings.driver}")
+    return arm_kit(arm, Address(host, port, baud, settings))
 
 
 def _limits(rig: Path | None, max_state_age_s: float) -> "SafetyConfig":
     """The envelope, with room for the age that this arm's states normally have."""
-    from rig.config import SafetyConfig
     from rig.config_load import load_config
+    from rig.config_safety import SafetyConfig
 
     if rig is None:
         # Where the base frame lies is the rig file's knowledge: without it, no box makes sense.

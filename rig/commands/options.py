@@ -12,7 +12,7 @@ from rig.exit_codes import ExitCode, exit_code_of
 
 if TYPE_CHECKING:
     from rig.live import View
-    from rig.loop import RunOutcome
+    from rig.outcome import RunOutcome
     from rig.records import Json
 
 Target = Annotated[
@@ -40,7 +40,7 @@ def view_for(console: Console) -> "View":
 
 def exit_code_of_run(outcome: "RunOutcome", summary: Mapping[str, "Json"]) -> ExitCode:
     """0 only for a run that obtained a radius and was not cut short."""
-    from rig.loop import Ending
+    from rig.outcome import Ending
 
     if outcome.error is not None:
         return exit_code_of(outcome.error)

@@ -44,6 +44,12 @@ def run(
         ),
     ] = False,
     seed: Seed = None,
+    uncalibrated: Annotated[
+        bool,
+        typer.Option(
+            "--uncalibrated", help="Use nominal values, whatever `rig calibrate` has found."
+        ),
+    ] = False,
     as_json: AsJson = False,
     out: Annotated[
         Path | None,
@@ -51,6 +57,7 @@ def run(
     ] = None,
 ) -> None:
     """Move the camera, estimate the target's radius and pose, write a run directory."""
+    from rig.calibrated import calibrated
     from rig.config_load import load_config
     from rig.records import make_run_dir, write_summary
     from rig.report import write_report
@@ -62,7 +69,8 @@ def run(
     extra += [] if duration is None else [f"run.duration_s={duration!r}"]
     extra += [] if seed is None else [f"sim.seed={seed}"]
     extra += ["run.until_converged=true"] if until_converged else []
-    config = load_config(target, rig, extra)
+    config, source = calibrated(load_config(target, rig, extra), uncalibrated)
+    warn(f"calibration: {source}")
     run_dir = make_run_dir(out, target)
     console = Console(stderr=as_json)
     with StopRequest() as stop_requested:

@@ -13,6 +13,11 @@ sim_app = typer.Typer(
 )
 Host = Annotated[str, typer.Option(help="A loopback address: 127.0.0.1, 127.0.0.2, …")]
 
+# What one kind of arm calls differently, or has only the like of: tried where the arm does not
+# know the name itself.
+_NEAREST = {"protective_stop": "alarm", "alarm": "protective_stop", "program_stop": "reset"}
+_CAMERA_FAULTS = "camera_unplug, camera_freeze, camera_repeat"
+
 
 @sim_app.command()
 def serve(
@@ -31,6 +36,10 @@ def serve(
     for_s: Annotated[
         float, typer.Option("--for", min=1.0, max=86400.0, help="Seconds until it ends.")
     ] = 3600.0,
+    ur_version: Annotated[
+        str | None,
+        typer.Option(help="The UR controller's software version; 3.… is a CB3, 125 Hz."),
+    ] = None,
     rig: RigFile = None,
     assignments: Assignments = None,
 ) -> None:
@@ -51,7 +60,7 @@ def serve(
     with (
         StopRequest("ending …") as stop_requested,
         LoopbackRig(
-            arm, config.sim, target, clock, host, link, port if camera else None, for_s
+            arm, config.sim, target, clock, host, link, port if camera else None, for_s, ur_version
         ) as served,
     ):
         stream = "" if served.stream is None else f", camera {served.stream.url}"
@@ -68,8 +77,9 @@ def fault(
         str,
         typer.Argument(
             help="UR: protective_stop, emergency_stop, program_stop, drop, stall. Gantry: alarm, "
-            "door, hold, emergency_stop, reset, stall, drop. Camera: camera_unplug, "
-            "camera_freeze, camera_repeat. clear ends all of them."
+            "door, hold, emergency_stop, reset, stall, drop. A name of the other arm stands for "
+            "what comes nearest. Camera: camera_unplug, camera_freeze, camera_repeat. clear ends "
+            "all of them."
         ),
     ],
     after: Annotated[float, typer.Option(min=0.0, help="Seconds from now.")] = 0.0,
@@ -80,14 +90,29 @@ def fault(
 ) -> None:
     """Make the emulated rig at HOST fail."""
     from drivers.errors import ConfigError, ConnectError
-    from sim_backend.loopback_rig.orders import order
 
-    request: dict[str, object] = {"fault": kind, "after_s": after, "for_s": for_s}
     try:
-        order(host, {"do": "clear"} if kind == "clear" else request)
+        _order(host, kind, after, for_s)
     except OSError as error:
         raise ConnectError(
             f"no emulated rig answers at {host}: {error}; start one with `rig sim serve`"
         ) from error
     except ValueError as error:
-        raise ConfigError(str(error)) from error
+        raise ConfigError(f"{error}; of the camera: {_CAMERA_FAULTS}") from error
+
+
+def _order(host: str, kind: str, after_s: float, for_s: float) -> None:
+    """Order a fault, or the nearest one that this arm has; raises what ``order`` raises."""
+    from sim_backend.loopback_rig.orders import order
+
+    if kind == "clear":
+        order(host, {"do": "clear"})
+        return
+    times = {"after_s": after_s, "for_s": for_s}
+    try:
+        order(host, {"fault": kind, **times})
+    except ValueError:
+        if kind not in _NEAREST:
+            raise
+        order(host, {"fault": _NEAREST[kind], **times})
+        warn(f"this arm has no {kind}: made it {_NEAREST[kind]}, which comes nearest")

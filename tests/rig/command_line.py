@@ -8,6 +8,9 @@ from unittest import mock
 
 from rig.cli import main
 
+# The console script as a process of its own, from any directory.
+RIG = (sys.executable, "-c", "from rig.cli import main; main()")
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:

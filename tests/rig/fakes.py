@@ -11,13 +11,17 @@ from drivers.clock import Clock
 from drivers.errors import RigError
 from drivers.interfaces import ArmState, Frame
 from estimator.image.feature import Feature, Measurement
+from estimator.image.intrinsics import Intrinsics
 from rig.config import RigConfig
 from rig.config_load import load_config
+from rig.envelope import Envelope
 from rig.fusion import Fusion
-from rig.loop import LiveStatus, RunLoop
+from rig.loop import RunLoop
+from rig.outcome import LiveStatus
 from rig.records import RunLog
 from rig.run import make_controller, make_observer
 from rig.run_data import RunData
+from rig.safety import Limiter
 from rig.vision import Sighting
 from sim_backend.clock import SimulatedClock
 
@@ -26,6 +30,7 @@ P_BASE_M = np.array([0.0, 0.0, 0.3])  # the sphere's centre
 STEP_S = 0.002
 LATENCY_S = 0.04
 FRAME_S = 1.0 / 30.0
+INTRINSICS = Intrinsics(800.0, 800.0, 319.5, 239.5)
 
 
 def looking_down(height_m: float) -> np.ndarray:
@@ -120,11 +125,14 @@ class ExactVision:
             self.seq += 1
         return out
 
+    def problem(self) -> str | None:
+        return None
+
     def close(self) -> None:
         pass
 
     def _frame(self, t_s: float) -> Frame:
-        return Frame(np.zeros((4, 4), np.uint8), t_s, 0.0, self.seq, "sim")
+        return Frame(np.zeros((480, 640), np.uint8), t_s, 0.0, self.seq, "sim")
 
     def _measure(self, t_s: float) -> Measurement:
         if self.hidden(t_s):
@@ -167,6 +175,7 @@ def make_bench(
         vision=vision,
         fusion=fusion,
         controller=make_controller(config.motion),
+        limiter=Limiter(config.safety, Envelope(config.safety, np.eye(4), INTRINSICS)),
         config=config,
         data=data,
         log=log,

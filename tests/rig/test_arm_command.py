@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 from drivers.clock import WallClock
 from drivers.errors import ConfigError, ConnectError, OperateError
 from rig.commands.arm import arm_app
+from sim_backend.loopback_grbl.machine import Machine
+from sim_backend.loopback_grbl.server import LoopbackGantry
 from sim_backend.loopback_ur.process import LoopbackProcess
 from tests.drivers.ur.loopback import last_motion_s, start_loopback
 
@@ -82,6 +84,54 @@ def test_a_stopped_arm_is_explained_and_recovered_only_after_a_yes(loopback):
     assert "clear its way" in result.stdout
     assert "takes commands again" in result.stdout
     assert last_motion_s(loopback, recovered_s) == recovered_s
+
+
+@pytest.fixture
+def gantry(tmp_path) -> Iterator[LoopbackGantry]:
+    """A gantry 100 mm from its home corner."""
+    machine = Machine()
+    start = machine.column((-100.0, -100.0, -100.0, 5.0, 5.0, 5.0))
+    with LoopbackGantry(machine, start, tmp_path / "gantry", CLOCK) as running:
+        yield running
+
+
+def test_a_gantry_tells_its_state_its_delays_and_whether_it_moves(gantry):
+    result = rig_arm("status", "--arm", "grbl", "--port", str(gantry.port), "--json")
+    facts = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert facts["state"].startswith("The gantry is ready")
+    assert 0.0 < facts["round_trip_s"] < 0.1
+    assert 0.1 < facts["command_delay_s"] < 0.3
+    assert not facts["command_delay_measured"]
+    assert facts["bandwidth_hz"] == pytest.approx(0.125 / facts["command_delay_s"])
+
+
+def test_a_gantry_is_homed_only_after_a_yes(gantry):
+    port = str(gantry.port)
+    before, _ = gantry.joints()
+    with pytest.raises(OperateError, match=r"not homed.*nothing moved"):
+        rig_arm("home", "--arm", "grbl", "--port", port, answer="n\n")
+    assert np.array_equal(gantry.joints()[0], before)
+    result = rig_arm("home", "--arm", "grbl", "--port", port, "--yes")
+    assert result.exit_code == 0
+    assert "every axis to its switch" in result.stdout
+    assert "is homed; its tool is at" in result.stdout
+    home = Machine().joints(np.zeros(6))
+    assert gantry.joints()[0] == pytest.approx(home, abs=1e-6)
+
+
+def test_a_locked_gantry_is_homed_and_then_free(gantry):
+    gantry.inject("alarm")
+    assert rig_arm("status", "--arm", "grbl", "--port", str(gantry.port)).exit_code == 3
+    result = rig_arm("home", "--arm", "grbl", "--port", str(gantry.port), "--yes")
+    assert "The gantry is locked" in result.stdout
+    assert rig_arm("status", "--arm", "grbl", "--port", str(gantry.port)).exit_code == 0
+
+
+def test_arms_without_homing_say_so_and_ask_nothing():
+    with pytest.raises(ConfigError, match="nothing to home, and nothing moved"):
+        rig_arm("home", "--arm", "ur", "--host", "127.0.0.1")
+    assert "always knows where it is" in rig_arm("home", "--arm", "sim").stdout
 
 
 def test_stop_stops_the_program(loopback):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import ConfigError, DeviceTimeoutError, SafetyError
-from rig.config import SafetyConfig
+from rig.config_safety import SafetyConfig
 from rig.jog import jog
 from sim_backend.clock import SimulatedClock
 from sim_backend.config import SimConfig

@@ -41,6 +41,15 @@ def test_missed_grid_points_are_skipped_and_counted_never_made_up_for() -> None:
     assert stats.overruns == 4
 
 
+def test_lateness_is_summed_up_over_all_ticks() -> None:
+    stats = TickStats()
+    assert (stats.late_median_s(), stats.late_p99_s(), stats.late_max_s()) == (0.0, 0.0, 0.0)
+    stats.late_s += [0.001] * 99 + [0.5]
+    assert stats.late_median_s() == 0.001
+    assert stats.late_max_s() == 0.5
+    assert 0.001 < stats.late_p99_s() < 0.5
+
+
 def test_the_rate_counts_ticks_over_the_span() -> None:
     stats = TickStats(ticks=300)
     assert stats.rate_hz(3.0) == 100.0

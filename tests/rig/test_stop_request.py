@@ -5,19 +5,29 @@ import signal
 import pytest
 
 from rig.stop_request import StopRequest
+from sim_backend.clock import SimulatedClock
 
 
-def test_the_first_signal_is_a_request_and_the_third_insists(
+def test_the_first_signal_is_a_request_and_a_late_third_one_insists(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    with StopRequest() as stop_requested:
+    clock = SimulatedClock()
+    with StopRequest(clock=clock) as stop_requested:
         assert not stop_requested()
-        signal.raise_signal(signal.SIGINT)
+        for _ in range(4):  # in a hurry: the first one has not had time to work
+            signal.raise_signal(signal.SIGINT)
         assert stop_requested()
-        assert "stopping the arm" in capsys.readouterr().err
-        signal.raise_signal(signal.SIGTERM)
+        assert capsys.readouterr().err.count("stopping the arm") == 1
+        clock.sleep_until(2.5)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+def test_before_anybody_asks_the_first_signal_leaves_at_once() -> None:
+    with StopRequest() as stop_requested:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        assert stop_requested()
 
 
 def test_the_handlers_of_before_are_back_afterwards() -> None:

@@ -1,4 +1,7 @@
-"""The whole arm over a pty in real time: short runs, wide bounds, exact outcomes."""
+"""The whole arm over a pty in real time: short runs, wide bounds, exact outcomes.
+
+What it owes as an ``Arm`` is held by ``tests/contract``; here is what is its own.
+"""
 
 import subprocess
 import sys
@@ -62,20 +65,9 @@ def rest_after(gantry: LoopbackGantry, since_s: float, span_s: float = 0.8) -> f
     return float(rows[moving[-1], 0] - since_s) if moving.size else 0.0
 
 
-def test_it_moves_measures_and_stops(gantry: LoopbackGantry, arm: GrblArm) -> None:
-    begun_s = CLOCK.now_s()
-    states = drive(arm, 0.03, 1.2)
-    assert len(states) > 15
-    rows = gantry.motion(begun_s)
-    assert np.percentile(rows[:, 7], 80) == pytest.approx(0.03, rel=0.02)
-    # A busy machine may make the motion pause; what is measured is the motion all the same.
-    for state in states:
-        x_m = np.interp(state.t_s, rows[:, 0], rows[:, 1])
-        assert state.T_base_tool[0, 3] == pytest.approx(x_m, abs=0.003)
-    begun_s = CLOCK.now_s()
-    arm.stop()
-    assert rest_after(gantry, begun_s) < 0.25
-    assert arm.timing.round_trip_s < 0.05
+def fastest_m_s(gantry: LoopbackGantry, since_s: float) -> float:
+    """The true speed along x; its greatest, because a busy machine may make the motion pause."""
+    return float(gantry.motion(since_s)[:, 7].max())
 
 
 @pytest.mark.parametrize(
@@ -106,7 +98,7 @@ def test_a_fault_is_typed_ends_in_rest_and_can_be_recovered_from(
     rested_s = CLOCK.now_s()
     assert rest_after(gantry, rested_s, 0.3) == 0.0
     drive(arm, 0.03, 0.5)
-    assert gantry.joints()[1][0] > 0.02
+    assert fastest_m_s(gantry, rested_s) > 0.02
 
 
 @pytest.mark.parametrize("fault", ["door", "emergency_stop"])
@@ -125,8 +117,9 @@ def test_a_gantry_found_locked_or_held_opens_says_so_and_is_recovered(
             arm.recover(lambda text: True)  # still open, still pressed
         gantry.clear(fault)
         arm.recover(lambda text: True)
+        recovered_s = CLOCK.now_s()
         drive(arm, 0.03, 0.5)
-        assert gantry.joints()[1][0] > 0.02
+        assert fastest_m_s(gantry, recovered_s) > 0.02
     finally:
         arm.close()
 

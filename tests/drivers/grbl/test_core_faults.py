@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import ConnectError, OperateError, RigError
+from drivers.grbl import faults as driver_faults
 from drivers.grbl import recovery
 from drivers.grbl.errors import AlarmError, HeldError, RefusedError, ResetError, SilentError
+from drivers.grbl.protocol import AlarmMessage
 from drivers.grbl.session import Session
 from sim_backend.loopback_grbl import faults
 from sim_backend.loopback_grbl.machine import Machine
@@ -150,6 +152,83 @@ def test_homing_unlocks_and_drives_to_machine_zero() -> None:
     assert gantry.firmware.position() == pytest.approx(np.zeros(6), abs=1e-9)
 
 
+def homing_error(gantry: Gantry) -> str:
+    with pytest.raises(OperateError) as caught:
+        recovery.home(gantry.link, gantry.clock, gantry.settings)
+    return str(caught.value)
+
+
+def test_homing_after_a_limit_switch_resets_first() -> None:
+    gantry = driving()
+    faults.inject(gantry.firmware, "alarm")
+    gantry.run(0.2)
+    recovery.home(gantry.link, gantry.clock, gantry.settings)
+    assert gantry.firmware.position() == pytest.approx(np.zeros(6), abs=1e-9)
+
+
+def test_a_controller_without_homing_says_so_and_nothing_moves() -> None:
+    gantry = Gantry(Machine(homing=False))
+    before = gantry.q()
+    assert "homing is switched off ($22=0)" in homing_error(gantry)
+    assert np.array_equal(gantry.q(), before)
+
+
+@pytest.mark.parametrize(("fault", "why"), [("emergency_stop", "emergency"), ("door", "door")])
+def test_nothing_is_homed_while_a_button_is_pressed_or_a_door_open(fault: str, why: str) -> None:
+    gantry = Gantry(UART)
+    before = gantry.q()
+    faults.inject(gantry.firmware, fault)
+    assert why in homing_error(gantry)
+    assert np.array_equal(gantry.q(), before)
+
+
+class Interrupted:
+    """A link whose reader is interrupted at an instant, as by Ctrl-C."""
+
+    def __init__(self, gantry: Gantry, at_s: float) -> None:
+        self._gantry, self._at_s = gantry, at_s
+
+    def read(self, wait_s: float) -> bytes:
+        if self._gantry.clock.now_s() >= self._at_s:
+            raise KeyboardInterrupt
+        return self._gantry.link.read(wait_s)
+
+    def write(self, data: bytes) -> None:
+        self._gantry.link.write(data)
+
+    def close(self) -> None:
+        self._gantry.link.close()
+
+
+def test_homing_that_is_interrupted_stops_at_once() -> None:
+    gantry = Gantry(UART)
+    link = Interrupted(gantry, gantry.clock.now_s() + 1.5)
+    with pytest.raises(KeyboardInterrupt):
+        recovery.home(link, gantry.clock, gantry.settings)
+    gantry.link.read(0.1)
+    assert not gantry.moving()
+    assert np.abs(gantry.q()).max() > 0.05  # it was on its way
+
+
+def test_a_homing_that_fails_is_reported_when_the_controller_says_so() -> None:
+    gantry = Gantry(UART)
+
+    class SwitchSticks(Interrupted):
+        def read(self, wait_s: float) -> bytes:
+            data = gantry.link.read(wait_s)
+            if gantry.clock.now_s() >= self._at_s:
+                self._at_s = float("inf")
+                return data + b"ALARM:8\r\n"
+            return data
+
+    begun_s = gantry.clock.now_s()
+    with pytest.raises(OperateError, match=r"could not be homed: ALARM:8.*did not open again"):
+        recovery.home(SwitchSticks(gantry, begun_s + 1.5), gantry.clock, gantry.settings)
+    assert gantry.clock.now_s() - begun_s < 3.0
+    gantry.link.read(0.1)
+    assert not gantry.moving()
+
+
 def test_a_program_left_over_from_a_killed_client_is_cancelled_at_connect() -> None:
     gantry = Gantry(UART)
     for _ in range(50):
@@ -212,3 +291,9 @@ def test_damaged_lines_in_full_motion_leave_a_safe_arm(when_ms: int, noise: byte
     last_s = gantry.clock.now_s()
     assert gantry.rest_after(last_s, 0.6) < 0.05 + 0.10
     assert gantry.core.failure is None or isinstance(gantry.core.failure, OperateError)
+
+
+@pytest.mark.parametrize(("code", "command"), [(1, "home"), (3, "home"), (2, "recover")])
+def test_an_alarm_that_costs_the_position_is_ended_by_homing(code: int, command: str) -> None:
+    said = str(driver_faults.from_message(AlarmMessage(code), "/dev/ttyACM0"))
+    assert f"then `rig arm {command} --arm grbl --port /dev/ttyACM0`" in said

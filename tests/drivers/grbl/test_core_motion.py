@@ -87,8 +87,31 @@ def test_the_stated_uncertainty_covers_the_measured_one(machine: Machine) -> Non
     gantry.states.clear()
     gantry.drive(0.03 * X, 2.0)
     error = np.std([state.twist_tool[0] for state in gantry.states])
+    stated = np.median([state.twist_std[0] for state in gantry.states])
     assert error < gantry.session.timing.velocity_std_m_s(0.03) < 0.002
+    assert error < 1.5 * stated < 0.003
     assert gantry.session.timing.velocity_std_m_s(0.03, 1.0) > 0.015  # what the mean hides
+
+
+@ALL
+def test_each_state_states_an_uncertainty_that_covers_its_error_also_while_accelerating(
+    machine: Machine,
+) -> None:
+    gantry = Gantry(machine)
+    turned = machine.axes == 6
+    twist = np.array([0.03, -0.02, 0.01, 0.1 * turned, 0.0, -0.2 * turned])
+    for k in range(6):
+        gantry.drive(twist if k % 2 else -twist, 0.5)
+    scores = []
+    for state in gantry.states[5:]:
+        q, qd = (part[: machine.axes] for part in gantry.firmware.history.at(state.t_s))
+        true = gantry.kinematics.tool_twist(q, qd)
+        known = state.twist_std > 0.0
+        scores += list(np.abs(state.twist_tool - true)[known] / state.twist_std[known])
+        assert np.abs(state.twist_tool - true)[~known] == pytest.approx(0.0, abs=1e-9)
+    assert np.percentile(scores, 68.0) < 1.5
+    assert np.percentile(scores, 95.0) < 3.0
+    assert all(0.0 < state.t_std_s < 0.01 for state in gantry.states)
 
 
 def test_states_come_at_fifty_hertz_and_none_is_older_than_the_timing_says() -> None:

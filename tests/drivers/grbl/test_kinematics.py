@@ -95,3 +95,12 @@ def test_units_signs_and_zeros_of_the_controller() -> None:
     rates = gantry.axis_rates_of(qd)
     assert rates == pytest.approx([-100.0, 0.0, -200.0, np.rad2deg(0.3)])
     assert gantry.joint_rates_of(rates) == pytest.approx(qd)
+
+
+@pytest.mark.parametrize("axes", [3, 4, 5, 6])
+def test_the_jacobian_is_the_map_from_joint_rates_to_the_tools_twist(axes):
+    wrist = WristSettings(tool_xyz_m=(0.03, -0.02, -0.05), tool_rotvec_rad=(2.0, 0.4, 0.1))
+    kinematics = GantryKinematics(standard_axes(axes), wrist)
+    rng = np.random.default_rng(axes)
+    q, qd = rng.normal(size=axes), rng.normal(size=axes)
+    assert kinematics.tool_jacobian(q) @ qd == pytest.approx(kinematics.tool_twist(q, qd))

@@ -37,6 +37,8 @@ from drivers.grbl.protocol import (
             "<Door:1|MPos:0.000,0.000,0.000|Pn:XD>",
             Status("Door", 1, (0.0, 0.0, 0.0), None, None, "XD"),
         ),
+        ("<Home|MPos:0.000|H:0,3>", Status("Home", None, (0.0,), None, None, "", False)),
+        ("<Idle|MPos:0.000|H:1>", Status("Idle", None, (0.0,), None, None, "", True)),
         ("<Idle|MPos:1.0,nan,2.0|Bf:1,2>", Unknown("<Idle|MPos:1.0,nan,2.0|Bf:1,2>")),
         ("<Idle|MPos:1.0,2.0", Unknown("<Idle|MPos:1.0,2.0")),
         ("okok", Unknown("okok")),

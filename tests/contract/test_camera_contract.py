@@ -66,9 +66,14 @@ def scripted_device(stack: ExitStack, folder: Path) -> Backend:
     return Backend(camera, script.clock, scripted.PERIOD_S, 0.5)
 
 
-def real_device(stack: ExitStack, folder: Path) -> Backend:
+def first_device(stack: ExitStack, folder: Path) -> Backend:
+    return live(sorted(glob("/dev/video*"))[0])
+
+
+def live(source: str) -> Backend:
     clock = WallClock()
-    camera = open_camera(CameraSettings(source=sorted(glob("/dev/video*"))[0]), clock)
+    given = int(source) if source.isdecimal() else source
+    camera = open_camera(CameraSettings(source=given), clock)
     rate_hz = camera.health().measured_rate_hz
     assert rate_hz is not None
     return Backend(camera, clock, 1 / rate_hz, 0.5)
@@ -87,14 +92,18 @@ NEEDS_DEVICE = [
         video_file,
         mjpeg_stream,
         scripted_device,
-        pytest.param(real_device, marks=NEEDS_DEVICE),
+        pytest.param(first_device, marks=NEEDS_DEVICE),
+        pytest.param(None, marks=pytest.mark.hardware("--camera-source")),
     ],
-    ids=lambda make: make.__name__,
+    ids=lambda make: "real_camera" if make is None else make.__name__,
 )
 def backend(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Backend]:
-    make: Callable[[ExitStack, Path], Backend] = request.param
+    make: Callable[[ExitStack, Path], Backend] | None = request.param
     with ExitStack() as stack:
-        made = make(stack, tmp_path)
+        if make is None:
+            made = live(request.config.getoption("--camera-source"))
+        else:
+            made = make(stack, tmp_path)
         stack.callback(made.camera.close)
         yield made
 
