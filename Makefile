@@ -4,7 +4,7 @@ TARGET ?= sphere
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-slow test-lowest lint bench clean
+.PHONY: run test test-slow test-faults test-lowest lint bench clean
 
 run: $(VENV)/.installed
 	$(BIN)/rig run --target $(TARGET)
@@ -13,7 +13,12 @@ test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest
 
 test-slow: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -m slow --seeds 3
+
+# Every fault and every ending at 20 random moments, in real time: an hour or two.
+test-faults: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -m slow --seeds 20 -s tests/rig/test_faults.py tests/rig/test_endings.py \
+	  tests/rig/test_endings_killed.py
 
 test-lowest:
 	$(PYTHON) -m venv .venv-lowest

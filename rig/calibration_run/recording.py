@@ -18,7 +18,8 @@ from rig.frames import twist_map
 
 FloatArray = NDArray[np.float64]
 
-_MARGIN_S = 0.7  # of rest before and after a segment: the latency may be anything up to that
+_MARGIN_S = 0.7  # of rest before and after a segment
+_LATENESS_S = 0.6  # stamps may be this wrong: pictures nearer to the record's ends are not used
 _MOST_MISSING = 0.3  # share of a segment's pictures without the board
 _DELAYS = 120  # pictures waited for, to see how long after their stamps they come
 _READ_TIMEOUT_S = 0.5

@@ -169,7 +169,11 @@ class Session:
             )
         recording = self._store.recording
         assert recording is not None  # either it was there or it was made
-        self.latency = fit_delay(recording, geometry)
+        try:
+            self.latency = fit_delay(recording, geometry)
+        except CalibrationError:
+            self._store.drop_recording()  # the same again would fail again
+            raise
         self._save(latency=latency_result(self.latency, self._depends_on))
         return self.latency
 

@@ -76,6 +76,11 @@ class Store:
         )
         self.recording = recording
 
+    def drop_recording(self) -> None:
+        """Forget the recording, also on disk."""
+        (self._directory / _RECORDING).unlink(missing_ok=True)
+        self.recording = None
+
     def _clear(self) -> None:
         for pattern in ("still-*", _RECORDING):
             for path in self._directory.glob(pattern):

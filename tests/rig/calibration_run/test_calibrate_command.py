@@ -1,0 +1,125 @@
+"""``rig calibrate`` on the simulated rig: finds a hidden truth, and says what is wrong."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.rig.command_line import Outcome, rig
+
+SMALL = [
+    "calibration.plan.poses=12",
+    "calibration.plan.verify_poses=2",
+    "calibration.plan.segment_s=3",
+    "sim.renderer=raster",
+]
+T_TOOL_CAMERA = [0.042, -0.012, 0.052, 0.15, -0.05, 0.15]  # up to 12 mm and 4° from the drawings
+TRUTH = [
+    f"sim.T_tool_camera={T_TOOL_CAMERA}",
+    "sim.camera.fx=775",
+    "sim.camera.fy=775",
+    "sim.camera.cx=325",
+    "sim.camera.cy=236",
+    "sim.camera.latency_s=0.075",
+    "sim.camera.stamps=arrival",
+]
+
+
+def calibrate(*steps: str, settings: list[str]) -> Outcome:
+    return rig("calibrate", *steps, "--json", *[f"--set={s}" for s in [*SMALL, *settings]])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A working directory with the calibration of a rig whose truth is hidden."""
+    before, path = Path.cwd(), tmp_path_factory.mktemp("bench")
+    os.chdir(path)
+    done = calibrate(settings=TRUTH)
+    (path / "out.json").write_text(done.stdout, encoding="utf-8")
+    assert done.exit_code == 0, done.stderr
+    yield path
+    os.chdir(before)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_hidden_truth_is_found(folder: Path) -> None:
+    found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
+    lens, place = found["intrinsics"], found["hand_eye"]
+    assert lens["fx"] == pytest.approx(775, rel=1e-3)
+    assert lens["fy"] == pytest.approx(775, rel=1e-3)
+    assert [lens["cx"], lens["cy"]] == pytest.approx([325, 236], abs=1.0)
+    T = place["T_tool_camera"]
+    assert T[:3] == pytest.approx(T_TOOL_CAMERA[:3], abs=3e-4)
+    turn = Rotation.from_rotvec(T[3:]).inv() * Rotation.from_rotvec(T_TOOL_CAMERA[3:])
+    assert np.degrees(turn.magnitude()) < 0.1
+    assert found["latency_s"] == pytest.approx(0.075, abs=1.5e-3)
+    assert found["stamp_late_s"] == pytest.approx(0.075, abs=2e-4)
+    assert found["latency_std_s"] < 1e-3
+    assert found["held_out_px"] < 0.15
+    assert found["verdict"] == "passed"
+    assert (folder / found["file"]).exists()
+
+
+def test_a_run_takes_the_calibration_and_measures_the_ball(folder: Path) -> None:
+    done = rig("run", "--target", "sphere", "--json", *[f"--set={s}" for s in [*TRUTH, SMALL[-1]]])
+    assert done.exit_code == 0, done.stderr
+    assert "calibration: calibration/sim.yaml" in done.stderr
+    assert abs(json.loads(done.stdout)["relative_error"]) < 3e-3
+
+
+def test_an_interrupted_calibration_goes_on_with_what_it_has(folder: Path) -> None:
+    (folder / "calibration" / "sim-data" / "recording.npz").unlink()
+    done = calibrate("latency", settings=TRUTH)
+    assert done.exit_code == 0, done.stderr
+    assert json.loads(done.stdout)["stamp_late_s"] == pytest.approx(0.075, abs=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["sim.board.visible=false"], "no board in view"),
+        (["sim.board.dictionary=DICT_5X5_100"], "wrong board"),
+        (["sim.camera.exposure_s=0.004", "calibration.board.squares=[4,3]"], "wrong board"),
+    ],
+)
+def test_a_board_that_cannot_be_used_is_named(here: Path, settings: list[str], words: str) -> None:
+    done = calibrate(settings=settings)
+    assert done.exit_code == 6
+    assert words in done.stderr
+    assert done.stdout == ""
+
+
+def test_nothing_to_resume_is_said(here: Path) -> None:
+    done = calibrate("latency", settings=[])
+    assert done.exit_code == 2
+    assert "nothing to resume" in done.stderr
+
+
+def test_a_place_that_cannot_be_written_is_said_before_anything_moves(here: Path) -> None:
+    (here / "calibration").write_text("in the way", encoding="utf-8")
+    done = calibrate(settings=[])
+    assert done.exit_code == 2
+    assert "cannot write" in done.stderr
+
+
+def test_the_board_is_printed_with_its_definition(here: Path) -> None:
+    done = rig("calibrate", "board", "--paper", "a4")
+    assert done.exit_code == 0
+    assert (here / "board.pdf").read_bytes().startswith(b"%PDF")
+    assert "squares" in done.stdout
+
+
+@pytest.mark.parametrize("wrong", ["7", "7x", "axb", "2x2"])
+def test_a_board_that_cannot_be_printed_is_refused(here: Path, wrong: str) -> None:
+    done = rig("calibrate", "board", "--squares", wrong)
+    assert done.exit_code == 2
+    assert not (here / "board.pdf").exists()

@@ -1,0 +1,147 @@
+"""Which calibration a run uses, and which it refuses."""
+
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import ConfigError
+from rig.calibrated import calibrated, calibration_path, fingerprints, with_nominal
+from rig.calibration.board import BoardConfig
+from rig.calibration.result import (
+    CalibrationFile,
+    HandEyeResult,
+    IntrinsicsResult,
+    IntrinsicsStd,
+    LatencyResult,
+    Verdict,
+    save_calibration,
+)
+from rig.config import RigConfig
+from rig.config_load import load_config
+
+
+def config(*assignments: str) -> RigConfig:
+    return load_config("sphere", None, list(assignments))
+
+
+def calibration_of(rig: RigConfig, passed: bool = True) -> CalibrationFile:
+    now = fingerprints(rig)
+    zero = (0.0, 0.0, 0.0)
+    return CalibrationFile(
+        rig=rig.name,
+        made="2026-01-01",
+        board=BoardConfig(),
+        intrinsics=IntrinsicsResult(
+            width=640,
+            height=480,
+            fx_px=790.0,
+            fy_px=791.0,
+            cx_px=320.0,
+            cy_px=240.0,
+            distortion=(0.01, 0.0, 0.0, 0.0, 0.0),
+            std=IntrinsicsStd(fx_px=0.1, fy_px=0.1, cx_px=0.1, cy_px=0.1, distortion=(0.0,) * 5),
+            obtained="by hand",
+            fit_px=0.1,
+            held_out_px=0.1,
+            coverage=1.0,
+            views=10,
+            depends_on=now,
+        ),
+        hand_eye=HandEyeResult(
+            tool_camera_xyz_m=(0.01, 0.02, 0.03),
+            tool_camera_rotvec_rad=(0.1, 0.2, 0.3),
+            std_xyz_m=zero,
+            std_rotvec_rad=zero,
+            base_board_xyz_m=zero,
+            base_board_rotvec_rad=zero,
+            obtained="by hand",
+            fit_px=0.1,
+            held_out_px=0.1,
+            held_out_mm=0.1,
+            held_out_deg=0.1,
+            corner_px=0.1,
+            arm_m=0.0,
+            arm_rad=0.0,
+            scale=1.0,
+            scale_std=0.001,
+            poses=10,
+            held_out_poses=2,
+            depends_on=now,
+        ),
+        latency=LatencyResult(
+            latency_s=0.05,
+            std_s=1e-4,
+            obtained="by hand",
+            segments_s=(0.05, 0.05),
+            correlation=1.0,
+            depends_on=now,
+        ),
+        verdict=Verdict(passed=passed, reasons=() if passed else ("held-out error",)),
+    )
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_without_a_file_the_device_s_own_values_hold() -> None:
+    rig = config()
+    assert calibrated(rig) == (rig, "the device's own")
+
+
+def test_the_file_goes_before_given_values() -> None:
+    rig = config("calibration.latency_s=0.9")
+    save_calibration(calibration_of(rig), calibration_path(rig))
+    used, source = calibrated(rig)
+    assert source == "calibration/sim.yaml"
+    assert used.calibration.intrinsics is not None
+    assert used.calibration.intrinsics.fx_px == 790.0
+    assert used.calibration.tool_camera_xyz_m == (0.01, 0.02, 0.03)
+    assert used.calibration.latency_s == 0.05
+
+
+def test_a_file_that_is_named_must_be_there() -> None:
+    with pytest.raises(ConfigError, match="rig calibrate"):
+        calibrated(config("calibration.file=elsewhere.yaml"))
+
+
+def test_a_failed_calibration_is_refused_with_its_reasons() -> None:
+    rig = config()
+    save_calibration(calibration_of(rig, passed=False), calibration_path(rig))
+    with pytest.raises(ConfigError, match=r"held-out error.*--uncalibrated"):
+        calibrated(rig)
+
+
+def test_a_calibration_of_another_setup_is_refused_with_the_step_to_repeat() -> None:
+    rig = config()
+    save_calibration(calibration_of(rig), calibration_path(rig))
+    changed = rig.model_copy(update={"camera": rig.camera.model_copy(update={"driver": "other"})})
+    with pytest.raises(ConfigError, match="rig calibrate intrinsics"):
+        calibrated(changed)
+
+
+def test_another_board_in_the_configuration_does_not_matter_to_a_run() -> None:
+    rig = config()
+    save_calibration(calibration_of(rig), calibration_path(rig))
+    calibrated(config("calibration.board.square_m=0.04", "calibration.board.marker_m=0.03"))
+
+
+def test_the_calibration_of_another_rig_is_refused() -> None:
+    rig = config()
+    other = calibration_of(rig).model_copy(update={"rig": "other"})
+    save_calibration(other, calibration_path(rig))
+    with pytest.raises(ConfigError, match="rig other"):
+        calibrated(rig)
+
+
+def test_uncalibrated_takes_the_drawings_of_the_simulated_rig_never_its_truth() -> None:
+    rig = config("sim.T_tool_camera=[0.1,0,0,0,0,0]", "sim.camera.fx=700", "sim.camera.fy=700")
+    save_calibration(calibration_of(rig), calibration_path(rig))
+    used, source = calibrated(rig, uncalibrated=True)
+    assert "nominal" in source
+    assert used == with_nominal(rig)
+    assert used.calibration.intrinsics is not None
+    assert used.calibration.intrinsics.fx_px == 800.0
+    assert used.calibration.tool_camera_xyz_m == (0.03, -0.02, 0.06)
