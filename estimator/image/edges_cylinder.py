@@ -9,6 +9,7 @@ import numpy as np
 from estimator.image.edges_profile import MAX_PEAKS
 from estimator.image.edges_sphere import LCG_FACTOR, LCG_STEP, robust_scale
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_linear import spread_through
 from estimator.image.outline_normals import across
 from estimator.jit import jit
 
@@ -176,18 +177,29 @@ def fit_line(
 
 
 @jit
+def cross(p: FloatArray, q: FloatArray) -> FloatArray:
+    """p x q, all (3,)."""
+    out = np.empty(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[i] = p[j] * q[k] - p[k] * q[j]
+    return out
+
+
+@jit
 def cylinder_of_lines(n1: FloatArray, n2: FloatArray) -> tuple[FloatArray, FloatArray]:
     """s (3,) and unit axis a (3,) from the two unit normals towards the axis; eqs. (15)-(18)."""
     delta = 0.5 * (n1 + n2)
-    a = np.cross(n2, n1)
-    return delta / np.sum(delta * delta), a / np.sqrt(np.sum(a * a))
+    a = cross(n2, n1)
+    s = delta / (delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2)
+    return s, a / np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
 
 
 @jit
 def lines_of_cylinder(s: FloatArray, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The unit normals n1, n2 (3,) of a cylinder's tangent planes; eq. (15) divided by R^2."""
-    ss = np.sum(s * s)
-    b = np.sqrt(max(ss - 1.0, 0.0)) * np.cross(s, axis)
+    ss = s[0] ** 2 + s[1] ** 2 + s[2] ** 2
+    b = np.sqrt(max(ss - 1.0, 0.0)) * cross(s, axis)
     return (s - b) / ss, (s + b) / ss
 
 
@@ -197,6 +209,5 @@ def cylinder_covariance(
 ) -> FloatArray:
     """Covariance (3, 3) of s from those of the two independent normals; derivative of (16)."""
     delta = 0.5 * (n1 + n2)
-    dd = np.sum(delta * delta)
-    jacobian = 0.5 * (np.eye(3) / dd - 2.0 * np.outer(delta, delta) / dd**2)
-    return jacobian @ (covariance_1 + covariance_2) @ jacobian.T
+    dd = delta[0] ** 2 + delta[1] ** 2 + delta[2] ** 2
+    return spread_through(delta, 0.5 / dd, -1.0 / dd**2, covariance_1 + covariance_2)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimator.image.edges_camera import GreyImage
-from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
+from estimator.image.edges_cylinder import cross, cylinder_covariance, lines_of_cylinder
 from estimator.image.edges_fit import EdgeFit
 from estimator.image.edges_signs import cone_shift_px, line_shift_px
 from estimator.image.feature import Feature, Measurement
@@ -95,10 +95,13 @@ def _grid_covariance(
     spread = np.empty((2, 3, 3))
     for side in range(2):
         n, normals = (n1, one) if side == 0 else (n2, other)
-        wide, high = np.ptp(normals[:, 0]), np.ptp(normals[:, 1])
-        angle = _GRID_PX / (1.0 + min(wide, high) ** 2) / focal_px
-        across = np.cross(axis, n)
-        spread[side] = angle**2 * np.outer(across, across)
+        # A line's normals come in order along it.
+        wide, high = normals[-1, 0] - normals[0, 0], normals[-1, 1] - normals[0, 1]
+        angle = _GRID_PX / (1.0 + min(abs(wide), abs(high)) ** 2) / focal_px
+        across = angle * cross(axis, n)
+        for i in range(3):
+            for j in range(3):
+                spread[side, i, j] = across[i] * across[j]
     return cylinder_covariance(n1, n2, spread[0], spread[1])
 
 

@@ -32,10 +32,14 @@ def appearance(
     deep = stands_out_deep(image, normals, sign, _DEPTH_PX)
     limit = min(max(_AGREE_SCALES * scale_px, _LEAST_AGREE_PX), _MOST_AGREE_PX)
     agreeing = np.zeros(count, np.bool_)
+    share = expected_px = deep_share = 0.0
     for i in range(count):
         # False for NaN, where there is no edge.
         agreeing[i] = abs(residuals_px[i]) < limit and expected[i] < NOISE_MOST_PX
-    return agreeing, float(np.mean(agreeing)), float(np.mean(expected)), float(np.mean(deep))
+        share += 1.0 if agreeing[i] else 0.0
+        expected_px += expected[i]
+        deep_share += 1.0 if deep[i] else 0.0
+    return agreeing, share / count, expected_px / count, deep_share / count
 
 
 @jit
@@ -57,26 +61,29 @@ def bends_px(
 
     First of a fit of the ``few`` first shapes alone, then of all of them.
     """
-    count = shapes.shape[0]
-    r = np.where(agreeing, residuals_px, 0.0)
-    weighted = np.empty(r.shape[0])
-    m, rhs = np.zeros((count, count)), np.zeros((count, 1))
+    count, places = shapes.shape
+    shown = np.empty(places)
+    m, rhs = np.zeros((count, count)), np.zeros((count, 2))
     for j in range(count):
-        for i in range(r.shape[0]):
-            weighted[i] = shapes[j, i] if agreeing[i] else 0.0
-        rhs[j, 0] = np.sum(weighted * r)
+        for i in range(places):
+            shown[i] = shapes[j, i] if agreeing[i] else 0.0
+            rhs[j, 0] += shown[i] * residuals_px[i] if agreeing[i] else 0.0
+        rhs[j, 1] = rhs[j, 0]
         for k in range(j + 1):
             total = 0.0
-            for i in range(r.shape[0]):
-                total += weighted[i] * shapes[k, i]
+            for i in range(places):
+                total += shown[i] * shapes[k, i]
             m[j, k] = total
         # The ridge keeps waves small that only the gaps in the outline could tell.
         m[j, j] += _RIDGE
     cholesky(m)
-    of_few = rhs[:few].copy()
-    solve_column(m[:few, :few].copy(), of_few, 0)
-    solve_column(m, rhs, 0)
-    return np.sqrt(np.sum(of_few[free:] ** 2)), np.sqrt(np.sum(rhs[free:] ** 2))
+    solve_column(m[:few, :few], rhs[:few], 0)
+    solve_column(m, rhs, 1)
+    bend_few = bend_all = 0.0
+    for j in range(free, count):
+        bend_few += rhs[j, 0] ** 2 if j < few else 0.0
+        bend_all += rhs[j, 1] ** 2
+    return np.sqrt(bend_few), np.sqrt(bend_all)
 
 
 @jit

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimator.image.edges_profile import MAX_PEAKS
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_linear import spread_through
 from estimator.jit import jit
 
 _TRIALS = 150
@@ -198,6 +199,5 @@ def fit_cone(
 @jit
 def s_of_cone(w: FloatArray, covariance_w: FloatArray) -> tuple[FloatArray, FloatArray]:
     """s (3,) and its covariance (3, 3) from w = s / sqrt(|s|^2 - 1)."""
-    q = np.sqrt(np.sum(w * w) - 1.0)
-    jacobian = np.eye(3) / q - np.outer(w, w) / q**3
-    return w / q, jacobian @ covariance_w @ jacobian.T
+    q = np.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2 - 1.0)
+    return w / q, spread_through(w, 1.0 / q, -1.0 / q**3, covariance_w)

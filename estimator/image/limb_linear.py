@@ -126,3 +126,20 @@ def solve_fixed(
     cholesky(m)
     solve_column(m, x, 0)
     return x[:, 0].copy()
+
+
+@jit_sums
+def spread_through(along: FloatArray, level: float, bend: float, m: FloatArray) -> FloatArray:
+    """J m J for the symmetric J = level I + bend along along^T, all (3, 3) and ``along`` (3,)."""
+    j = np.empty((3, 3))
+    for row in range(3):
+        for column in range(3):
+            j[row, column] = bend * along[row] * along[column]
+        j[row, row] += level
+    out = np.zeros((3, 3))
+    for row in range(3):
+        for column in range(3):
+            for k in range(3):
+                for i in range(3):
+                    out[row, column] += j[row, k] * m[k, i] * j[i, column]
+    return out

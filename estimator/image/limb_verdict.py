@@ -19,11 +19,18 @@ _MOST_SHIFT_PX, _MOST_SHIFT_SD, _MOST_SHIFT_STD_PX, _MOST_CHI2 = 0.5, 4.0, 0.5, 
 @jit
 def in_view(starts: NDArray[np.int64]) -> BoolArray:
     """Which sectors (n,) are not cut away by the image's border, from `collect`'s ``starts``."""
-    counts = starts[1:] - starts[:-1]
-    filled = counts[counts > 0]
-    if filled.shape[0] == 0:
-        return np.zeros(counts.shape[0], np.bool_)
-    enough: BoolArray = counts > _LEAST_FILLED * np.median(filled)
+    sectors = starts.shape[0] - 1
+    filled = np.empty(sectors)
+    some = 0
+    for k in range(sectors):
+        if starts[k + 1] > starts[k]:
+            filled[some] = starts[k + 1] - starts[k]
+            some += 1
+    enough = np.zeros(sectors, np.bool_)
+    if some > 0:
+        least = _LEAST_FILLED * np.median(filled[:some])
+        for k in range(sectors):
+            enough[k] = starts[k + 1] - starts[k] > least
     return enough
 
 

@@ -214,7 +214,9 @@ def warm_up(target: Target, intrinsics: Intrinsics, method: Method = "limb") -> 
     u, v = u - u.mean(), v - v.mean()
     away = np.hypot(u, v) if target == "sphere" else np.abs(u)
     share = np.clip(0.2 * min(u.max(), v.max()) + 10.0 - away, 0.0, 1.0)
-    image = np.rint(20.0 + 200.0 * share).astype(np.uint8)
+    # Without noise the refinement would be doubted, and what comes after it not be called.
+    noise = np.random.default_rng(0).normal(0.0, 2.0, share.shape)
+    image = np.rint(20.0 + 200.0 * share + noise).astype(np.uint8)
     tracker = TargetTracker(target, intrinsics, method)
     for _ in range(3):
         tracker.measure(image)

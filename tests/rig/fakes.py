@@ -168,7 +168,7 @@ def make_bench(
     vision = ExactVision(clock, arm)
     data = RunData("sphere", np.eye(4))
     log = RunLog(run_dir, config)
-    fusion = Fusion(make_observer(config, "sphere"), data, log, config.safety.max_state_age_s)
+    fusion = Fusion(make_observer(config, "sphere"), data, log, 2.0 * config.safety.max_state_age_s)
     loop = RunLoop(
         clock=clock,
         arm=arm,
