@@ -24,7 +24,7 @@ _SHAPE = (0.05, 2.4)
 _CORNERS = (0.1, 3.2)
 # Lines nearly along the pixel grid show its steps as long waves of up to 0.08 px.
 _LINE_SCATTER = (0.13, 2.3)
-_LINE_SHAPE = (0.1, 2.6)
+_LINE_SHAPE = (0.1, 3.0)
 # Sides of a cylinder face each other, and seen at up to 60 degrees they taper to a third at most.
 _MOST_ALIGNED, _LEAST_TAPER = -0.5, 0.3
 _LEAST_WIDTH_PX = 14.0
