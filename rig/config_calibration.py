@@ -24,7 +24,7 @@ class IntrinsicsConfig(Section):
 class PlanConfig(Section):
     """What `rig calibrate` collects."""
 
-    poses: Annotated[int, Field(ge=10, le=200)] = 25
+    poses: Annotated[int, Field(ge=10, le=200)] = 30
     verify_poses: Annotated[int, Field(ge=2, le=50)] = 4
     segments: Annotated[int, Field(ge=2, le=10)] = 2  # of wiggling, for the latency
     segment_s: Annotated[float, Field(ge=3, le=60)] = 5.0

@@ -53,7 +53,9 @@ def coarse_latency(
             f"the image moves at only {speed:.1f} px/s rms, too slowly to time it: wiggle the "
             "camera across the board at 0.5 Hz and more, by a centimetre or two"
         )
-    grid = np.arange(arm.start_s, arm.end_s, _STEP_S)
+    steps = int((arm.end_s - arm.start_s) / _STEP_S)
+    # Not np.arange with an end: rounding can put its last value behind that.
+    grid = np.minimum(arm.start_s + _STEP_S * np.arange(steps + 1), arm.end_s)
     predicted = _pixels(board_seen(state, arm.poses(grid)), outline, intrinsics)
     lags, correlations = _correlate(times, moved, grid, predicted, range_s)
     if len(lags) == 0:

@@ -73,10 +73,13 @@ def record(
         mover.on_tick = lambda now_s: None
     states = mover.states[first:]
     delays_s = _delays(camera, clock)
-    views = tuple(_seen(number, frames, detect) for number, frames in enumerate(segments, start=1))
+    times_s = np.array([state.t_s for state in states])
+    begin_s, end_s = times_s[0] + _LATENESS_S, times_s[-1] - _LATENESS_S
+    usable = [[f for f in s if begin_s <= f.t_exposure_mid_s <= end_s] for s in segments]
+    views = tuple(_seen(number, frames, detect) for number, frames in enumerate(usable, start=1))
     return Recording(
         segments=views,
-        times_s=np.array([state.t_s for state in states]),
+        times_s=times_s,
         T_base_tool=np.array([state.T_base_tool for state in states]),
         delays_s=delays_s,
         height=segments[0][0].image.shape[0],

@@ -10,8 +10,10 @@ from rig.calibration.errors import CalibrationError
 from rig.calibration.excitation import Excitation
 from rig.calibration.hand_eye_model import State
 from rig.calibration.latency import LatencyFit, fit_latency
+from rig.calibration.latency_coarse import coarse_latency
 from rig.calibration.projection import to_vector
 from rig.calibration.trajectory import Trajectory
+from rig.calibration.views import BoardView, StampedView
 from tests.rig.calibration.synthetic import Truth, random_truth, tool_poses, transform
 from tests.rig.calibration.synthetic_motion import Session, wiggle_session
 
@@ -171,3 +173,18 @@ def test_the_wiggles_rate_is_the_derivative_of_its_displacement() -> None:
     motion = Excitation(4.0, seed=3)
     moved = sum(motion.twist_camera(t) * 0.001 for t in np.arange(0.0005, 1.7, 0.001))
     assert np.allclose(moved, motion.displacement(1.7), atol=1e-6)
+
+
+def test_a_record_whose_end_no_step_meets_exactly_is_searched_to_its_end() -> None:
+    times = 75.5 + 0.002 * np.arange(6555)  # np.arange(start, end, step) goes past this end
+    arm = Trajectory(times, np.broadcast_to(np.eye(4), (len(times), 4, 4)))
+    at_rest = State(np.eye(4), np.eye(4), np.array([800.0, 800, 319.5, 239.5, 0, 0, 0, 0, 0]))
+    x, y = np.mgrid[:3, :3] * 0.05
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(9)], axis=1)
+    pixels = [800.0 * points[:, :2] / 0.4 + 100.0 + 5.0 * (k % 3) for k in range(60)]
+    views = [
+        StampedView(BoardView(np.arange(9), points, seen), 80.0 + k / 30.0)
+        for k, seen in enumerate(pixels)
+    ]
+    with pytest.raises(CalibrationError, match="does not move as the arm does"):
+        coarse_latency(views, arm, at_rest, 0.5)
