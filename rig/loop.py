@@ -18,6 +18,7 @@ from rig.frames import twist_map
 from rig.fusion import Fusion
 from rig.outcome import Ending, LiveStatus, RunOutcome
 from rig.records import RunLog
+from rig.rest import wait_for_rest
 from rig.run_data import RunData
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
@@ -25,9 +26,6 @@ from rig.supervisor import RigState, Supervisor, Verdict
 from rig.vision import Vision
 from rig.watch import Watch
 
-_AT_REST_M_S = 2e-3
-_AT_REST_RAD_S = 1e-2
-_REST_TIMEOUT_S = 3.0
 # After a long gap the controller and the limiter act as if it had been this many ticks.
 _LONGEST_STEP_TICKS = 3.0
 
@@ -93,7 +91,7 @@ class RunLoop:
                 self._log.event(self._clock.now_s(), "ended", repr(crash))
             raise
         self._arm.stop()
-        at_rest = self._wait_for_rest()
+        at_rest = wait_for_rest(self._clock, self._arm, self._fusion, self._period_s)
         ended_s = self._clock.now_s()
         if at_rest and error is None:
             self._enter(RigState.STOPPED, ending.value)
@@ -249,28 +247,7 @@ class RunLoop:
             if not np.any(allowed.twist_tool):
                 return
 
-    def _wait_for_rest(self) -> bool:
-        """Whether the arm is measured at rest within 3 s of its stop."""
-        deadline_s = self._clock.now_s() + _REST_TIMEOUT_S
-        while self._clock.now_s() < deadline_s:
-            try:
-                self._fusion.add_states(self._arm.read_states())
-            except RigError:
-                return False
-            state = self._fusion.state
-            if state is not None and _at_rest(state):
-                return True
-            self._clock.sleep_until(self._clock.now_s() + self._period_s)
-        return False
-
     def _enter(self, state: RigState, detail: str) -> None:
         now_s = self._clock.now_s()
         self._supervisor.enter(state, now_s, detail)
         self._log.event(now_s, f"state {state}", detail)
-
-
-def _at_rest(state: ArmState) -> bool:
-    return bool(
-        np.linalg.norm(state.twist_tool[:3]) < _AT_REST_M_S
-        and np.linalg.norm(state.twist_tool[3:]) < _AT_REST_RAD_S
-    )
