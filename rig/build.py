@@ -90,15 +90,28 @@ def build_rig(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
     Raises ConfigError for devices that do not go together or lack a calibration, ConnectError
     when one cannot be opened. What was opened before is closed again.
     """
-    drivers = (config.camera.driver, config.arm.driver)
-    if drivers == ("sim", "sim"):
+    if is_simulated(config):
         return _simulated(config, target, realtime)
-    if "sim" in drivers:
+    return _hardware(config, target)
+
+
+def is_simulated(config: RigConfig) -> bool:
+    """Whether both devices are simulated; raises ConfigError when only one of them is."""
+    drivers = (config.camera.driver, config.arm.driver)
+    if drivers != ("sim", "sim") and "sim" in drivers:
         raise ConfigError(
             f"camera.driver = {drivers[0]} and arm.driver = {drivers[1]} do not go together: "
             "the simulated camera shows what the simulated arm does, so choose both or neither"
         )
-    return _hardware(config, target)
+    return "sim" in drivers
+
+
+def open_simulated(
+    config: RigConfig, scene: str, realtime: bool, camera_elsewhere: bool
+) -> Devices:
+    """The simulated rig in front of a target or the board."""
+    build = cast(Callable[[RigConfig, str, Clock | None, bool], Devices], load_entry(_SIMULATED))
+    return build(config, scene, WallClock() if realtime else None, camera_elsewhere)
 
 
 def open_camera(config: CameraConfig, clock: Clock) -> Camera:
@@ -125,10 +138,7 @@ def open_remote_camera(
 
 def _simulated(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
     apart = realtime and config.run.vision != "thread"
-    build = cast(
-        Callable[[RigConfig, TargetKind, Clock | None, bool], Devices], load_entry(_SIMULATED)
-    )
-    devices = build(config, target, WallClock() if realtime else None, apart)
+    devices = open_simulated(config, target, realtime, apart)
     intrinsics, T_tool_camera = given_geometry(config, devices)
     vision: Vision
     if devices.camera is None:

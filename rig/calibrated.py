@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from drivers.errors import ConfigError
+from rig.build import is_simulated
 from rig.calibration.result import CalibrationFile, Fingerprints, fingerprint, load_calibration
 from rig.calibration.result_check import check_usable
 from rig.config import RigConfig
@@ -51,7 +52,7 @@ def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig
 
 def with_nominal(config: RigConfig) -> RigConfig:
     """The configuration with what is known without a calibration; simulated: its drawings."""
-    if config.camera.driver != "sim" or config.arm.driver != "sim":
+    if not is_simulated(config):
         return config
     drawn, camera, given = SimConfig(), config.sim.camera, config.calibration
     values: dict[str, object] = {}

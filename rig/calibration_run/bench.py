@@ -1,23 +1,19 @@
 """The devices of a calibration: a camera that looks at the board, an arm, nominal values."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self, cast
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock, WallClock
-from drivers.errors import ConfigError
 from drivers.interfaces import Arm, Camera
 from estimator.image.intrinsics import Intrinsics
-from rig.build import Devices, given_geometry, load_entry, open_arm, open_camera
+from rig.build import given_geometry, is_simulated, open_arm, open_camera, open_simulated
 from rig.config import RigConfig
 
 FloatArray = NDArray[np.float64]
-
-_SIMULATED = "rig.build_sim:build_simulated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +23,6 @@ class Bench:
     camera: Camera
     arm: Arm
     clock: Clock
-    realtime: bool
     intrinsics: Intrinsics
     T_tool_camera: FloatArray  # (4, 4)
 
@@ -52,22 +47,12 @@ def open_bench(config: RigConfig, realtime: bool) -> Bench:
     Raises ConfigError when nominal values are missing or devices do not go together,
     ConnectError when one cannot be opened.
     """
-    drivers = (config.camera.driver, config.arm.driver)
-    if drivers == ("sim", "sim"):
-        build = cast(
-            Callable[[RigConfig, str, Clock | None, bool], Devices], load_entry(_SIMULATED)
-        )
-        devices = build(config, "board", WallClock() if realtime else None, False)
+    if is_simulated(config):
+        devices = open_simulated(config, "board", realtime, camera_elsewhere=False)
         assert devices.camera is not None  # it was asked for here, not in another process
         intrinsics, T_tool_camera = given_geometry(config, devices)
-        return Bench(
-            devices.camera, devices.arm, devices.clock, realtime, intrinsics, T_tool_camera
-        )
-    if "sim" in drivers:
-        raise ConfigError(
-            f"camera.driver = {drivers[0]} and arm.driver = {drivers[1]} do not go together: "
-            "the simulated camera shows what the simulated arm does, so choose both or neither"
-        )
+        devices.everything_ready()
+        return Bench(devices.camera, devices.arm, devices.clock, intrinsics, T_tool_camera)
     intrinsics, T_tool_camera = given_geometry(config, None)
     clock = WallClock()
     camera = open_camera(config.camera, clock)
@@ -76,4 +61,4 @@ def open_bench(config: RigConfig, realtime: bool) -> Bench:
     except BaseException:
         camera.close()
         raise
-    return Bench(camera, arm, clock, True, intrinsics, T_tool_camera)
+    return Bench(camera, arm, clock, intrinsics, T_tool_camera)

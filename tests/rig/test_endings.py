@@ -181,8 +181,6 @@ def test_ctrl_c_while_everything_is_still_being_opened(
 
 def test_head_ends_the_run_without_a_complaint(rig: Served, tmp_path: Path) -> None:
     """The pipe as a shell makes it."""
-    if rig.arm != "ur":
-        pytest.skip("once is enough")
     arguments = " ".join(f"'{argument}'" for argument in rig.arguments())
     program = f"{sys.executable} -c 'from rig.cli import main; main()'"
     done = subprocess.run(
