@@ -61,13 +61,17 @@ def list_cameras(source: SourceOption = None, as_json: AsJson = False) -> None:
             "give --source with a stream's URL, a video file or an image folder"
         )
         return
-    table = Table("node", "stable name", "camera", "modes", "held by")
+    table = Table("node", "camera", "modes", "held by")
     for node in cameras:
-        stable = "\n".join(node.by_id) or "–"
         held = ", ".join(str(holder) for holder in node.holders) or "–"
         modes = modes_text(node, whole=source is not None)
-        table.add_row(node.node, stable, node.name or "–", modes, held)
-    Console().print(table)
+        table.add_row(node.node, node.name or "–", modes, held)
+    console = Console()
+    console.print(table)
+    for node in cameras:
+        # Never cut or broken: a name is there to be copied.
+        names = ", ".join(node.by_id) or "no stable name (one needs a USB camera)"
+        console.print(f"{node.node}: {names}", soft_wrap=True, highlight=False)
 
 
 @camera_app.command()

@@ -1,6 +1,7 @@
 """``rig camera`` as a user meets it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -69,6 +70,12 @@ def test_a_camera_is_listed_with_its_stable_name_modes_and_holder(
     assert "YUYV 640x480 @ 30, 15" in whole
     listed = json.loads(call("list", "--json").stdout)["cameras"]
     assert [node["node"] for node in listed] == ["/dev/video0", "/dev/video1"]
+
+
+def test_a_long_stable_name_can_be_copied_from_a_narrow_terminal(machine: list[VideoNode]) -> None:
+    name = "/dev/v4l/by-id/usb-046d_Maker_Professional_Webcam_C920_1A2B3C4D-video-index0"
+    machine.append(replace(CAMERA, by_id=(name,)))
+    assert name in CliRunner().invoke(camera_app, ["list"], env={"COLUMNS": "60"}).stdout
 
 
 def test_with_several_cameras_one_must_be_chosen(machine: list[VideoNode]) -> None:
