@@ -9,8 +9,10 @@ BIN := $(VENV)/bin
 run: $(VENV)/.installed
 	$(BIN)/rig run --target $(TARGET)
 
+# Two at a time; then, one by one, the tests that run on the wall clock.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m 'not slow and not hardware and not realtime'
+	$(BIN)/python -m pytest -m 'realtime and not slow and not hardware'
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -m slow --seeds 3

@@ -21,6 +21,8 @@ from tests.contract.arms import (
 )
 from tests.contract.driving import HOLD_S, Driving, opened
 
+pytestmark = pytest.mark.realtime
+
 REST = np.zeros(6)
 
 

@@ -21,6 +21,8 @@ from sim_backend.loopback_camera.server import MjpegServer
 from sim_backend.rig import SimulatedRig
 from tests.drivers.camera import recordings, scripted, streams
 
+pytestmark = pytest.mark.realtime
+
 
 @dataclass(frozen=True)
 class Backend:

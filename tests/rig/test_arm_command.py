@@ -19,6 +19,8 @@ from sim_backend.loopback_grbl.server import LoopbackGantry
 from sim_backend.loopback_ur.process import LoopbackProcess
 from tests.drivers.ur.loopback import last_motion_s, start_loopback
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 
 

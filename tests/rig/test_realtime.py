@@ -9,6 +9,8 @@ import pytest
 from drivers.errors import ConfigError
 from rig.realtime import control_conditions, step_back
 
+pytestmark = pytest.mark.realtime
+
 
 class Scheduler:
     """The system's scheduler as one thread sees it; it may refuse priorities."""

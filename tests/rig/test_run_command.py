@@ -159,6 +159,7 @@ def test_wrong_usage_exits_2_says_why_and_leaves_nothing_behind(
     assert not out.exists()
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_in_real_time_ramps_the_arm_to_rest(number: int, tmp_path: Path) -> None:
     process = subprocess.Popen(

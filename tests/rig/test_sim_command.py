@@ -8,6 +8,8 @@ from sim_backend.loopback_rig.orders import ORDER_PORT, OrderServer
 from tests.rig.command_line import rig
 from tests.rig.loopback_served import free_host
 
+pytestmark = pytest.mark.realtime
+
 
 class Rig:
     """Remembers what was ordered; knows the faults of one kind of arm."""

@@ -11,6 +11,8 @@ from drivers.clock import WallClock
 from drivers.errors import ConnectError, OperateError
 from tests.drivers.camera.scripted import Script
 
+pytestmark = pytest.mark.realtime
+
 Make = Callable[..., OpenCvCamera]
 
 

@@ -13,6 +13,8 @@ from drivers.interfaces import Frame
 from sim_backend.loopback_camera.publisher import encode_part
 from tests.drivers.camera.streams import HEIGHT, WIDTH, ByteServer, noisy
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n"
 TIMEOUT_S = 0.3

@@ -15,6 +15,8 @@ from drivers.errors import ConnectError
 from sim_backend.loopback_camera.server import MjpegServer
 from tests.drivers.camera.streams import HEIGHT, WIDTH, TickingCamera
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 
 

@@ -21,6 +21,8 @@ from sim_backend.loopback_grbl.machine import Machine
 from sim_backend.loopback_grbl.server import LoopbackGantry
 from tests.drivers.grbl.simulated import CLIENT, settings_for
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 MACHINE = Machine()
 X = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -21,6 +21,8 @@ from drivers.ur.settings import UrSettings
 from sim_backend.loopback_ur.kinematics import transform
 from tests.drivers.ur.loopback import drive, last_motion_s
 
+pytestmark = pytest.mark.realtime
+
 TWIST = np.array([0.04, 0.0, 0.02, 0.0, 0.0, 0.1])
 CLOCK = WallClock()
 

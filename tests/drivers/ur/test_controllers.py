@@ -13,6 +13,8 @@ from drivers.ur.status import read_status
 from sim_backend.loopback_ur.process import LoopbackProcess
 from tests.drivers.ur.loopback import drive, last_motion_s, start_loopback
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 TWIST = np.array([0.04, 0.0, 0.02, 0.0, 0.0, 0.1])
 

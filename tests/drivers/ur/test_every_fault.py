@@ -16,6 +16,8 @@ from drivers.ur.faults import (
 from drivers.ur.settings import UrSettings
 from tests.drivers.ur.loopback import drive, last_motion_s
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 SEEDS = 20
 POLL_S = 0.01  # the program looks at the arm this often

@@ -18,6 +18,8 @@ from sim_backend.loopback_ur.controller import Controller
 from sim_backend.loopback_ur.rtde_session import RtdeSession
 from tests.drivers.ur.loopback import free_host
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 Answer = Callable[[socket.socket], None]
 

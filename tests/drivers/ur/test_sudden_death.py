@@ -12,6 +12,8 @@ from drivers.clock import WallClock
 from sim_backend.loopback_ur.process import LoopbackProcess
 from tests.drivers.ur.loopback import last_motion_s
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 WATCHDOG_HZ = 10.0
 BRAKING_S = 0.1  # from 45 mm/s

@@ -7,6 +7,8 @@ from drivers.clock import WallClock
 from drivers.ur.noise import noise_at_rest
 from tests.drivers.ur.samples import sample_at
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 
 

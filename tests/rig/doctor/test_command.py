@@ -14,6 +14,8 @@ from rig.config_load import packaged_config
 from rig.doctor.checks import CHECKS, Check
 from tests.rig.command_line import rig
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 QUICKEST = ("kernel", "memory", "disk", "serial_nodes")
 ODD = "tests.rig.doctor.odd_checks:"

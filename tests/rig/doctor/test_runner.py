@@ -7,12 +7,16 @@ import sys
 import tempfile
 from pathlib import Path
 
+import pytest
+
 from drivers.clock import WallClock
 from rig.config import RigConfig
 from rig.doctor.checks import CHECKS, Check, checks_for
 from rig.doctor.finding import Finding, Status, finding_of
 from rig.doctor.runner import run_checks
 from rig.doctor.subject import Subject, subject_of
+
+pytestmark = pytest.mark.realtime
 
 CLOCK = WallClock()
 SUBJECT = Subject(RigConfig(name="mine"), Path("/nowhere/runs"), quick=True, root=Path("/fake"))

@@ -26,6 +26,8 @@ from tests.rig.vision.discs import (
     watch,
 )
 
+pytestmark = pytest.mark.realtime
+
 COUNT = 8
 
 

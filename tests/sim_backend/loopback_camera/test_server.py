@@ -13,6 +13,8 @@ from drivers.interfaces import Frame
 from sim_backend.loopback_camera.server import MjpegServer
 from tests.drivers.camera.streams import TickingCamera, noisy
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 
 

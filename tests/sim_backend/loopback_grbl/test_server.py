@@ -13,6 +13,8 @@ from sim_backend.loopback_grbl.machine import Machine
 from sim_backend.loopback_grbl.process import LoopbackGantryProcess
 from sim_backend.loopback_grbl.server import LoopbackGantry
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 MACHINE = Machine(lost_status=0.0)
 

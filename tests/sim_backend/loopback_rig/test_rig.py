@@ -9,6 +9,8 @@ from drivers.errors import ConfigError
 from sim_backend.config import SimConfig
 from sim_backend.loopback_rig.rig import LoopbackRig
 
+pytestmark = pytest.mark.realtime
+
 
 def served(tmp_path: Path, **changes: object) -> LoopbackRig:
     given: dict[str, object] = {

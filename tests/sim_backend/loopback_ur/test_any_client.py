@@ -16,6 +16,8 @@ from sim_backend.loopback_ur.server import CONTROL_PORT, DASHBOARD_PORT, RTDE_PO
 from tests.drivers.ur.loopback import start_loopback
 from tests.sim_backend.loopback_ur.plain_client import PlainClient
 
+pytestmark = pytest.mark.realtime
+
 
 @pytest.fixture(scope="module")
 def loopback() -> Iterator[LoopbackProcess]:

@@ -12,6 +12,8 @@ from sim_backend.loopback_ur.server import DASHBOARD_PORT
 from tests.drivers.ur.loopback import start_loopback
 from tests.sim_backend.loopback_ur.plain_client import PlainClient
 
+pytestmark = pytest.mark.realtime
+
 CLOCK = WallClock()
 
 

@@ -18,6 +18,8 @@ from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
 from sim_backend.loopback_ur.truth import ArmCameraMotion, ArmTruth
 from tests.drivers.ur.loopback import start_loopback
 
+pytestmark = pytest.mark.realtime
+
 T_TOOL_CAMERA = transform((0.03, -0.02, 0.06, 0.1, -0.08, 0.12))
 CLOCK = WallClock()
 
