@@ -22,6 +22,9 @@ _BREACH_MARGIN_M = 0.01
 _BLOCKED_BELOW = 0.02
 # A blocked motion is free again when this share of it would be let through.
 _FREE_ABOVE = 0.1
+# Slower than this (1/s of whatever a barrier counts in) is rounding, not an approach: an axis that
+# stands on its end after homing must not keep the others from moving.
+_STANDSTILL = 1e-9
 # Braking before a barrier may use this share of the acceleration limit.
 _BRAKING_SHARE = 0.5
 
@@ -131,6 +134,8 @@ class Limiter:
         braking = _BRAKING_SHARE * self._config.max_linear_acceleration_m_s2
         for barrier in self._envelope.barriers(twist, around):
             allowed = barrier.allowed_closing(braking, self._config.reaction_time_s)
+            if barrier.closing <= _STANDSTILL:
+                continue
             if barrier.closing > allowed and allowed / barrier.closing < least:
                 least, name = allowed / barrier.closing, barrier.name
         return least, name

@@ -14,6 +14,7 @@ FloatArray = NDArray[np.float64]
 # be longer than any block.
 _APPROACH_S = 0.15
 _BLOCKED_BELOW = 0.02
+_ROUNDING = 1e-9  # of the fastest axis: no motion
 
 
 class AxisLimits:
@@ -51,9 +52,12 @@ class AxisLimits:
         return f"{self._names[axis]} is at the end of its range, {end:g} in machine coordinates"
 
     def _left(self, position: FloatArray, rates: FloatArray) -> FloatArray:
+        # Rounding in the kinematics gives every axis a hair of motion: an axis that stands on its
+        # end after homing must not keep the others from moving.
+        hair = _ROUNDING * float(np.max(np.abs(rates), initial=0.0))
         left: FloatArray = np.where(
-            rates > 0.0,
+            rates > hair,
             self.high - position,
-            np.where(rates < 0.0, position - self.low, math.inf),
+            np.where(rates < -hair, position - self.low, math.inf),
         )
         return left

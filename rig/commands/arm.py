@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from rig.commands.options import AsJson, RigFile
 from rig.exit_codes import ExitCode
@@ -205,7 +206,7 @@ def _jog_facts(result: "JogResult", frame: str) -> dict[str, Any]:
 def _table(title: str, facts: dict[str, Any]) -> Table:
     table = Table(title=title, show_header=False)
     for name, value in facts.items():
-        table.add_row(name.replace("_", " "), _words(value))
+        table.add_row(name.replace("_", " "), Text(_words(value)))  # brackets are no markup
     return table
 
 

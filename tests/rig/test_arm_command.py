@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from drivers.clock import WallClock
@@ -22,6 +24,7 @@ from tests.drivers.ur.loopback import last_motion_s, start_loopback
 pytestmark = pytest.mark.realtime
 
 CLOCK = WallClock()
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +123,19 @@ def test_a_gantry_is_homed_only_after_a_yes(gantry):
     assert "is homed; its tool is at" in result.stdout
     home = Machine().joints(np.zeros(6))
     assert gantry.joints()[0] == pytest.approx(home, abs=1e-6)
+
+
+def test_what_held_a_motion_back_is_named_in_the_table(gantry, tmp_path):
+    rig_arm("home", "--arm", "grbl", "--port", str(gantry.port), "--yes")
+    config = yaml.safe_load((CONFIGS / "loopback_gantry.yaml").read_text(encoding="utf-8"))
+    config["arm"]["port"] = str(gantry.port)
+    rig = tmp_path / "lab.yaml"
+    rig.write_text(yaml.safe_dump(config))
+    jog = ("jog", "--arm", "grbl", "--rig", str(rig), "--for", "0.3")
+    up = rig_arm(*jog, "--twist", "0,0,0.005,0,0,0")
+    assert "[joint z max]" in up.stdout
+    down = json.loads(rig_arm(*jog, "--twist", "0,0,-0.005,0,0,0", "--json").stdout)
+    assert down["allowed"] == pytest.approx([0, 0, -0.005, 0, 0, 0])
 
 
 def test_a_locked_gantry_is_homed_and_then_free(gantry):

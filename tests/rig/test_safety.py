@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import SafetyError
-from drivers.interfaces import ArmState
+from drivers.interfaces import ArmState, Joints
 from rig.config_safety import SafetyConfig
 from rig.envelope import Surroundings
 from rig.safety import Limiter
@@ -130,3 +130,23 @@ def test_a_breach_in_the_measured_state_is_a_safety_stop(state: ArmState, words:
 
 def test_a_sound_state_passes() -> None:
     Limiter(CONFIG).check_state(state_at(), now_s=0.01)
+
+
+def test_an_axis_resting_on_its_end_does_not_keep_the_others_from_moving() -> None:
+    def jacobian(_: np.ndarray) -> np.ndarray:
+        # Rounding couples the axes: moving along z asks y for a hair.
+        return np.eye(6) + 1e-18 * np.eye(6, k=1)
+
+    names = ("x", "y", "z", "roll", "pitch", "spin")
+    at_its_end = np.array([0.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+    joints = Joints(
+        names, at_its_end, np.full(6, -0.5), np.full(6, 0.5), (True,) * 3 + (False,) * 3, jacobian
+    )
+    limiter, twist = Limiter(CONFIG), np.array([0.0, 1e-25, 0.005, 0.0, 0.0, 0.0])
+    for _ in range(100):
+        allowed = limiter.limit(twist, Surroundings(state_at(), joints=joints), DT_S)
+    assert np.allclose(allowed.twist_tool, twist)
+    outwards = limiter.limit(
+        np.array([0.0, 0.01, 0, 0, 0, 0]), Surroundings(state_at(), joints=joints), DT_S
+    )
+    assert outwards.blocked == "joint y max"

@@ -166,3 +166,14 @@ def test_the_end_of_a_range_is_named() -> None:
 def test_axes_without_a_range_have_none() -> None:
     limits = AxisLimits(standard_axes(3), controller(3))
     assert limits.scale(np.full(3, 1e6), np.array([50.0, 0.0, 0.0])) == 1.0
+
+
+def test_an_axis_on_its_end_after_homing_does_not_keep_the_others_from_moving() -> None:
+    machine = Machine()
+    limits = AxisLimits(axes_of(machine), controller())
+    homed = limits.high.copy()
+    along_z = np.array([0.0, 1e-17, -5.0, 0.0, 0.0, 0.0])  # y by rounding
+    assert limits.blocked_by(homed, along_z) is None
+    assert limits.scale(homed, along_z) == 1.0
+    blocked = limits.blocked_by(homed, np.array([0.0, 5.0, -5.0, 0.0, 0.0, 0.0]))
+    assert blocked is not None and blocked.startswith("Y (y) is at the end")
