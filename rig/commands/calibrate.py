@@ -1,6 +1,8 @@
 """``rig calibrate``: intrinsics, hand-eye, latency, verification; and the board to print."""
 
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,12 +24,42 @@ calibrate_app = typer.Typer(
 )
 
 Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
+_STEPS: dict[Step, str] = {
+    "intrinsics": "Look at the board from many poses; intrinsics and hand-eye are fitted together.",
+    "hand-eye": "Look at the board from many poses; intrinsics and hand-eye are fitted together.",
+    "latency": "Wiggle in front of the board, on what the hand-eye step collected.",
+    "verify": "Check the calibration with small motions and fresh poses.",
+}
+_ON_EARLIER_DATA = ("latency", "verify")
 Realtime = Annotated[
     bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
 ]
 Resume = Annotated[
     bool, typer.Option("--resume", help="Go on with what an interrupted calibration collected.")
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What the command line asks for."""
+
+    rig: Path | None
+    assignments: tuple[str, ...]
+    seed: int | None
+    resume: bool
+    realtime: bool
+    as_json: bool
+
+    def with_more(self, more: "Request") -> "Request":
+        """Options may stand before the step and after it; what stands after goes before."""
+        return Request(
+            more.rig or self.rig,
+            (*self.assignments, *more.assignments),
+            self.seed if more.seed is None else more.seed,
+            self.resume or more.resume,
+            self.realtime or more.realtime,
+            self.as_json or more.as_json,
+        )
 
 
 @calibrate_app.callback()
@@ -41,58 +73,31 @@ def calibrate(
     as_json: AsJson = False,
 ) -> None:
     """Calibrate everything, in order: intrinsics, hand-eye, latency, verification."""
+    context.obj = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json)
     if context.invoked_subcommand is None:
-        _run("all", rig, assignments, seed, resume, realtime, as_json)
+        _run("all", context.obj)
 
 
-@calibrate_app.command()
-def intrinsics(
-    rig: RigFile = None,
-    assignments: Assignments = None,
-    seed: Seed = None,
-    resume: Resume = False,
-    realtime: Realtime = False,
-    as_json: AsJson = False,
-) -> None:
-    """Look at the board from many poses; intrinsics and hand-eye are fitted together."""
-    _run("intrinsics", rig, assignments, seed, resume, realtime, as_json)
+def _command(step: Step) -> Callable[..., None]:
+    """The command of one step; all take the same options."""
+
+    def command(
+        context: typer.Context,
+        rig: RigFile = None,
+        assignments: Assignments = None,
+        seed: Seed = None,
+        resume: Resume = False,
+        realtime: Realtime = False,
+        as_json: AsJson = False,
+    ) -> None:
+        own = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json)
+        _run(step, context.obj.with_more(own))
+
+    return command
 
 
-@calibrate_app.command("hand-eye")
-def hand_eye(
-    rig: RigFile = None,
-    assignments: Assignments = None,
-    seed: Seed = None,
-    resume: Resume = False,
-    realtime: Realtime = False,
-    as_json: AsJson = False,
-) -> None:
-    """Look at the board from many poses; intrinsics and hand-eye are fitted together."""
-    _run("hand-eye", rig, assignments, seed, resume, realtime, as_json)
-
-
-@calibrate_app.command()
-def latency(
-    rig: RigFile = None,
-    assignments: Assignments = None,
-    seed: Seed = None,
-    realtime: Realtime = False,
-    as_json: AsJson = False,
-) -> None:
-    """Wiggle in front of the board, on what the hand-eye step collected."""
-    _run("latency", rig, assignments, seed, True, realtime, as_json)
-
-
-@calibrate_app.command()
-def verify(
-    rig: RigFile = None,
-    assignments: Assignments = None,
-    seed: Seed = None,
-    realtime: Realtime = False,
-    as_json: AsJson = False,
-) -> None:
-    """Check the calibration with small motions and fresh poses."""
-    _run("verify", rig, assignments, seed, True, realtime, as_json)
+for _step, _help in _STEPS.items():
+    calibrate_app.command(_step, help=_help)(_command(_step))
 
 
 @calibrate_app.command()
@@ -133,15 +138,7 @@ def board(
     print(definition(config), end="")
 
 
-def _run(
-    step: Step,
-    rig: Path | None,
-    assignments: list[str] | None,
-    seed: int | None,
-    resume: bool,
-    realtime: bool,
-    as_json: bool,
-) -> None:
+def _run(step: Step, request: Request) -> None:
     from drivers.clock import WallClock
     from rig.calibrated import calibration_path, fingerprints, with_nominal
     from rig.calibration.result import CalibrationFile, load_calibration
@@ -153,17 +150,19 @@ def _run(
     from rig.config_load import load_config
     from rig.stop_request import StopRequest
 
-    extra = [*(assignments or []), *([] if seed is None else [f"sim.seed={seed}"])]
-    config = with_nominal(load_config("sphere", rig, extra))
+    extra = [*request.assignments]
+    extra += [] if request.seed is None else [f"sim.seed={request.seed}"]
+    config = with_nominal(load_config("sphere", request.rig, extra))
     path, depends_on = calibration_path(config), fingerprints(config)
     console = Console(stderr=True)
+    resume = request.resume or step in _ON_EARLIER_DATA
     store = Store(path.with_name(f"{config.name}-data"), depends_on, resume)
     before: CalibrationFile | None = None
     if step != "all" and path.exists():
         before = load_calibration(path)
     wall = WallClock()
     start_s = wall.now_s()
-    with StopRequest() as stop_requested, open_bench(config, realtime) as bench:
+    with StopRequest() as stop_requested, open_bench(config, request.realtime) as bench:
         session = Session(
             config,
             bench,
@@ -176,7 +175,7 @@ def _run(
         )
         found = _steps(session, step)
     summary = json_of(session, found, path, wall.now_s() - start_s)
-    if as_json:
+    if request.as_json:
         print(json.dumps(summary), flush=True)
     console.print(table(summary))
     _finish(found, config, path)

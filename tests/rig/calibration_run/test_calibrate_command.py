@@ -123,3 +123,9 @@ def test_a_board_that_cannot_be_printed_is_refused(here: Path, wrong: str) -> No
     done = rig("calibrate", "board", "--squares", wrong)
     assert done.exit_code == 2
     assert not (here / "board.pdf").exists()
+
+
+def test_options_may_stand_before_the_step_too(here: Path) -> None:
+    done = rig("calibrate", "--set", "sim.camera.width=wide", "latency")
+    assert done.exit_code == 2
+    assert "sim.camera.width" in done.stderr
