@@ -8,7 +8,7 @@ from rig.calibration.result import CalibrationFile, Fingerprints, fingerprint, l
 from rig.calibration.result_check import check_usable
 from rig.config import RigConfig
 from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
-from sim_backend.config import SimConfig
+from sim_backend import drawings
 
 
 def calibration_path(config: RigConfig) -> Path:
@@ -51,21 +51,24 @@ def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig
 
 
 def with_nominal(config: RigConfig) -> RigConfig:
-    """The configuration with what is known without a calibration; simulated: its drawings."""
+    """The configuration with what is known without a calibration; simulated: its drawings.
+
+    Values that the rig file gives stay.
+    """
     if not is_simulated(config):
         return config
-    drawn, camera, given = SimConfig(), config.sim.camera, config.calibration
+    camera, given = config.sim.camera, config.calibration
     values: dict[str, object] = {}
     if given.intrinsics is None:
         values["intrinsics"] = IntrinsicsConfig(
-            fx_px=drawn.camera.focal_px,
-            fy_px=drawn.camera.focal_px,
+            fx_px=drawings.FOCAL_PX,
+            fy_px=drawings.FOCAL_PX,
             cx_px=0.5 * (camera.width - 1),
             cy_px=0.5 * (camera.height - 1),
         )
     if given.tool_camera_xyz_m is None:
-        values["tool_camera_xyz_m"] = drawn.T_tool_camera[:3]
-        values["tool_camera_rotvec_rad"] = drawn.T_tool_camera[3:]
+        values["tool_camera_xyz_m"] = drawings.T_TOOL_CAMERA[:3]
+        values["tool_camera_rotvec_rad"] = drawings.T_TOOL_CAMERA[3:]
     return _replaced(config, values)
 
 

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from drivers.errors import ConfigError
 from rig.calibrated import calibrated, calibration_path, fingerprints, with_nominal
@@ -18,6 +20,8 @@ from rig.calibration.result import (
 )
 from rig.config import RigConfig
 from rig.config_load import load_config
+from sim_backend import drawings
+from sim_backend.config import SimConfig
 
 
 def config(*assignments: str) -> RigConfig:
@@ -143,5 +147,14 @@ def test_uncalibrated_takes_the_drawings_of_the_simulated_rig_never_its_truth() 
     assert "nominal" in source
     assert used == with_nominal(rig)
     assert used.calibration.intrinsics is not None
-    assert used.calibration.intrinsics.fx_px == 800.0
-    assert used.calibration.tool_camera_xyz_m == (0.03, -0.02, 0.06)
+    assert used.calibration.intrinsics.fx_px == drawings.FOCAL_PX
+    assert used.calibration.tool_camera_xyz_m == drawings.T_TOOL_CAMERA[:3]
+
+
+def test_the_drawings_are_a_little_wrong_and_a_run_does_not_need_them() -> None:
+    drawn, built = np.array(drawings.T_TOOL_CAMERA), np.array(SimConfig().T_tool_camera)
+    turn = Rotation.from_rotvec(drawn[3:]).inv() * Rotation.from_rotvec(built[3:])
+    assert 0.005 < np.linalg.norm(drawn[:3] - built[:3]) < 0.015
+    assert 1.0 < np.degrees(turn.magnitude()) < 5.0
+    assert 0.01 < abs(drawings.FOCAL_PX / SimConfig().camera.focal_px - 1.0) < 0.05
+    assert calibrated(config())[0].calibration.intrinsics is None  # the factory's hold
