@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.config_load import packaged_config
+from rig.log.reader import open_log
 
 FloatArray = NDArray[np.float64]
 
@@ -148,9 +149,8 @@ def emulated_ur() -> Iterator[str]:
 
 def commands_of(run_dir: Path) -> FloatArray:
     """The instants (n,) of the commands of a run."""
-    with (run_dir / "log.jsonl").open(encoding="utf-8") as lines:
-        records = [json.loads(line) for line in lines]
-    return np.array([record["t_s"] for record in records if record["kind"] == "command"])
+    records = open_log(run_dir).records(["command"])
+    return np.array([record.values()["t_s"] for record in records])
 
 
 def report(found: Comparison) -> None:

@@ -40,6 +40,11 @@ def thread_cpu_time_s() -> float:
     return time.thread_time()
 
 
+def time_of_day_offset_ns() -> int:
+    """What to add to ``WallClock`` for nanoseconds since 1970, as it is now."""
+    return time.time_ns() - time.monotonic_ns()
+
+
 def local_timestamp() -> str:
     """The local date and time as ``YYYYmmdd-HHMMSS``, for naming directories."""
     return time.strftime("%Y%m%d-%H%M%S")

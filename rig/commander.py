@@ -7,7 +7,7 @@ from drivers.interfaces import Arm, ArmState, JointArm
 from estimator.estimate import Estimate
 from rig.deadman import Deadman
 from rig.envelope import Surroundings
-from rig.records import RunLog
+from rig.log.run_log import RunLog
 from rig.run_data import RunData
 from rig.safety import Allowed, Limiter
 

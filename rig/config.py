@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from rig.config_calibration import CalibrationConfig
 from rig.config_devices import ArmConfig, CameraConfig, SimArm, SimCamera
+from rig.config_log import LogConfig
 from rig.config_safety import SafetyConfig
 from rig.config_section import Finite, NotNegative, Section
 from sim_backend.config import SimConfig
@@ -59,6 +60,7 @@ class RigConfig(Section):
     motion: MotionConfig = MotionConfig()
     safety: SafetyConfig = SafetyConfig()
     run: RunConfig = RunConfig()
+    log: LogConfig = LogConfig()
     sim: SimConfig = SimConfig()
 
     @model_validator(mode="after")

@@ -1,7 +1,9 @@
 """Arm samples and sightings in, the newest estimate out: each image used at its own instant."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +12,32 @@ from drivers.errors import SafetyError
 from drivers.interfaces import ArmState, Frame
 from estimator.estimate import Correction, Estimate, Estimator
 from estimator.twist_history import MotionUnknownError, TwistHistory
-from rig.records import RunLog
 from rig.run_data import RunData, Snapshot
 from rig.vision import Sighting
 
 FloatArray = NDArray[np.float64]
 
 _PERIODS = 15  # the camera's period is the median over this many
+
+
+class FusionLog(Protocol):
+    """Who is told what went in and what came out."""
+
+    def states(self, states: Sequence[ArmState]) -> None:
+        """Arm samples that were read at once."""
+        ...
+
+    def frame(self, sighting: Sighting, handled_s: float) -> None:
+        """One image's measurement, and when it was handled."""
+        ...
+
+    def estimate(self, kind: str, estimate: Estimate) -> None:
+        """The state after an image (``kind`` update) or predicted to a tick (estimate)."""
+        ...
+
+    def event(self, t_s: float, name: str, detail: str = "") -> None:
+        """Something that happened."""
+        ...
 
 
 class Fusion:
@@ -29,7 +50,7 @@ class Fusion:
         self,
         estimator: Estimator,
         data: RunData,
-        log: RunLog,
+        log: FusionLog,
         max_extrapolation_s: float,
         stamps_late_s: float = 0.0,
     ) -> None:
@@ -56,8 +77,7 @@ class Fusion:
         twists = np.array([state.twist_tool for state in states])
         self._motion.extend([state.t_s for state in states], twists @ self._camera_from_tool.T)
         self._data.arm_states.extend(states)
-        for state in states:
-            self._log.arm(state)
+        self._log.states(states)
         self.state = states[-1]
 
     def add_sightings(self, sightings: list[Sighting], now_s: float) -> None:

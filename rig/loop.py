@@ -16,8 +16,8 @@ from rig.convergence import Convergence
 from rig.deadman import Deadman
 from rig.frames import twist_map
 from rig.fusion import Fusion
+from rig.log.run_log import RunLog
 from rig.outcome import Ending, LiveStatus, RunOutcome
-from rig.records import RunLog
 from rig.rest import wait_for_rest
 from rig.run_data import RunData
 from rig.safety import Limiter
@@ -135,6 +135,7 @@ class RunLoop:
         self._last_s = self._clock.now_s() - self._period_s
         for now_s in tick_grid(self._clock, self._period_s, self._stats):
             state = self._read(now_s)
+            self._log.tick(now_s, self._stats.late_s[-1], self._stats.overruns)
             estimate = self._fusion.advance(now_s)
             self._convergence.update()
             verdict = self._judge(now_s, state, estimate)

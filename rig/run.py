@@ -5,7 +5,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.clock import Clock, WallClock
+from drivers.clock import Clock, WallClock, time_of_day_offset_ns
 from estimator.active.controller import Controller
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.image.intrinsics import Intrinsics
@@ -20,10 +20,13 @@ from rig.deadman import Deadman
 from rig.envelope import Envelope
 from rig.fusion import Fusion
 from rig.live import View
+from rig.log.header import LogHeader
+from rig.log.recorder import Recorded
+from rig.log.run_log import open_run_log
 from rig.loop import RunLoop
 from rig.outcome import RunOutcome
 from rig.realtime import control_conditions
-from rig.records import Json, RunLog
+from rig.records import Json, write_config
 from rig.rehearsal import rehearse
 from rig.run_data import RunData
 from rig.safety import Limiter
@@ -47,8 +50,11 @@ def execute(
     realtime: bool,
     view: View,
     stop_requested: Callable[[], bool],
+    attachments: tuple[Path, ...] = (),
 ) -> RunResult:
     """Run once; the arm rests, and the log and configuration are written, when this returns.
+
+    ``attachments`` are put into the log, such as the calibration's file.
 
     Raises ConnectError when a device cannot be opened; failures during the run are in
     ``outcome.error``.
@@ -56,8 +62,9 @@ def execute(
     rehearse(make_observer(config, target), make_controller(config.motion), target)
     with (
         build_rig(config, target, realtime) as rig,
-        RunLog(run_dir, config, in_background=rig.realtime) as log,
+        open_run_log(run_dir, _header(rig, config, target, attachments), rig.clock) as log,
     ):
+        write_config(run_dir, config)
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
         # What has to be compiled is compiled here, before time counts.
         fusion = Fusion(
@@ -90,7 +97,23 @@ def execute(
             outcome = loop.run()
         outcome.stats.scheduling = scheduling
         wall_s = wall.now_s() - wall_start_s
-        return _result(rig, outcome, config, target, run_dir, wall_s)
+        return _result(rig, outcome, log.close(), config, target, run_dir, wall_s)
+
+
+def _header(
+    rig: Rig, config: RigConfig, target: TargetKind, attachments: tuple[Path, ...]
+) -> LogHeader:
+    return LogHeader(
+        target=target,
+        config=config,
+        intrinsics=rig.intrinsics,
+        T_tool_camera=rig.T_tool_camera,
+        realtime=rig.realtime,
+        renderer=rig.renderer,
+        radius_true_m=None if rig.truth is None else rig.truth.radius_m,
+        offset_ns=time_of_day_offset_ns() if rig.realtime else 0,
+        attachments=attachments,
+    )
 
 
 def _shown(view: View, rig: Rig) -> View:
@@ -113,6 +136,7 @@ def _conditions(rig: Rig, config: RigConfig) -> Iterator[tuple[str, Deadman | No
 def _result(
     rig: Rig,
     outcome: RunOutcome,
+    recorded: Recorded,
     config: RigConfig,
     target: TargetKind,
     run_dir: Path,
@@ -121,7 +145,17 @@ def _result(
     radius_true_m = None if rig.truth is None else rig.truth.radius_m
     analysis = analyse(outcome.data, config, radius_true_m)
     summary = summarise(target, outcome, analysis, config, rig.renderer, wall_s, run_dir)
-    return RunResult(summary, outcome, analysis, rig.intrinsics)
+    return RunResult({**summary, **_of_log(recorded)}, outcome, analysis, rig.intrinsics)
+
+
+def _of_log(recorded: Recorded) -> dict[str, Json]:
+    return {
+        "log_bytes": recorded.size_bytes,
+        "images_recorded": recorded.images,
+        "images_not_recorded": recorded.images_dropped,
+        "entries_not_recorded": recorded.entries_dropped,
+        "log_error": recorded.error or None,
+    }
 
 
 def make_observer(config: RigConfig, target: TargetKind) -> Observer:

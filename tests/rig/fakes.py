@@ -16,9 +16,11 @@ from rig.config import RigConfig
 from rig.config_load import load_config
 from rig.envelope import Envelope
 from rig.fusion import Fusion
+from rig.log.header import LogHeader
+from rig.log.run_log import RunLog, open_run_log
 from rig.loop import RunLoop
-from rig.outcome import LiveStatus
-from rig.records import RunLog
+from rig.outcome import LiveStatus, RunOutcome
+from rig.records import write_config
 from rig.run import make_controller, make_observer
 from rig.run_data import RunData
 from rig.safety import Limiter
@@ -153,6 +155,12 @@ class Bench:
     data: RunData
     config: RigConfig
     run_dir: Path
+    log: RunLog
+
+    def run(self) -> RunOutcome:
+        """Run the loop; the log is in its file when this returns."""
+        with self.log:
+            return self.loop.run()
 
 
 def make_bench(
@@ -162,12 +170,13 @@ def make_bench(
     on_tick: Callable[[LiveStatus], None] = lambda status: None,
 ) -> Bench:
     """The default sphere configuration around the fakes; the camera is the tool."""
-    config = load_config("sphere", None, assignments)
+    config = load_config("sphere", None, ["log.images=off", *(assignments or [])])
     clock = SimulatedClock()
     arm = KinematicArm(clock)
     vision = ExactVision(clock, arm)
     data = RunData("sphere", np.eye(4))
-    log = RunLog(run_dir, config)
+    write_config(run_dir, config)
+    log = open_run_log(run_dir, LogHeader("sphere", config, INTRINSICS, np.eye(4), False), clock)
     fusion = Fusion(make_observer(config, "sphere"), data, log, 2.0 * config.safety.max_state_age_s)
     loop = RunLoop(
         clock=clock,
@@ -182,4 +191,4 @@ def make_bench(
         stop_requested=lambda: stop_requested(clock),
         on_tick=on_tick,
     )
-    return Bench(loop, clock, arm, vision, data, config, run_dir)
+    return Bench(loop, clock, arm, vision, data, config, run_dir, log)

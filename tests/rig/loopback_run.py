@@ -15,6 +15,7 @@ import numpy as np
 from drivers.clock import WallClock
 from tests.rig.command_line import RIG
 from tests.rig.left_behind import MARK, processes_marked, shared_memory
+from tests.rig.log_lines import log_lines
 from tests.rig.loopback_served import Served
 
 CLOCK = WallClock()
@@ -31,7 +32,7 @@ class Result:
     exit_code: int
     stdout: str
     stderr: str
-    log: list[dict[str, Any]]  # without a last line cut short
+    log: list[dict[str, Any]]
     summary: dict[str, Any] | None
     ended_s: float  # when the process was gone
     left_behind: list[str]  # processes and shared memory a second later
@@ -92,8 +93,7 @@ class LoopbackRun:
     def wait_for_log(self, text: str, within_s: float) -> None:
         """Return as soon as the log holds ``text``."""
         give_up_s = CLOCK.now_s() + within_s
-        path = self._out / "log.jsonl"
-        while not (path.is_file() and text in path.read_text(encoding="utf-8")):
+        while not any(text in json.dumps(line) for line in log_lines(self._out)):
             assert CLOCK.now_s() < give_up_s, f"no {text!r} in the log; {self.said()}"
             CLOCK.sleep_until(CLOCK.now_s() + 0.02)
 
@@ -127,7 +127,7 @@ class LoopbackRun:
             exit_code=self.process.returncode,
             stdout=(self._out / "stdout").read_text(encoding="utf-8"),
             stderr=self.said(),
-            log=_log(self._out / "log.jsonl"),
+            log=log_lines(self._out),
             summary=_json(self._out / "summary.json"),
             ended_s=ended_s,
             left_behind=left,
@@ -175,14 +175,6 @@ def _take_terminal() -> None:
     import termios
 
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-
-def _log(path: Path) -> list[dict[str, Any]]:
-    if not path.is_file():
-        return []
-    text = path.read_text(encoding="utf-8")
-    whole = text[: text.rfind("\n") + 1]
-    return [json.loads(line) for line in whole.splitlines()]
 
 
 def _json(path: Path) -> dict[str, Any] | None:

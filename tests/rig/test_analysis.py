@@ -14,7 +14,7 @@ from tests.rig.fakes import P_BASE_M, RADIUS_M, Bench, make_bench
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bench, object]:
     """A perfect run of the fakes."""
     bench = make_bench(tmp_path_factory.mktemp("run"), ["run.duration_s=5"])
-    return bench, bench.loop.run()
+    return bench, bench.run()
 
 
 def test_a_perfect_rig_follows_the_ideal_response(finished) -> None:  # type: ignore[no-untyped-def]
@@ -64,7 +64,7 @@ def test_the_summary_holds_every_documented_key(finished, tmp_path: Path) -> Non
 def test_a_run_that_never_saw_its_target_has_no_radius(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.vision.hidden = lambda t_s: True
-    outcome = bench.loop.run()
+    outcome = bench.run()
     analysis = analyse(bench.data, bench.config, RADIUS_M)
     assert radius_obtained(outcome, analysis) is None
     summary = summarise("sphere", outcome, analysis, bench.config, None, 0.5, tmp_path)

@@ -1,6 +1,5 @@
 """The loop: how runs end, and that every ending leaves the arm at rest."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 from rig.outcome import Ending, LiveStatus
 from tests.rig.fakes import RADIUS_M, make_bench
+from tests.rig.log_lines import log_bytes, log_lines
 
 
 def assert_stopped(bench) -> None:  # type: ignore[no-untyped-def]
@@ -21,7 +21,7 @@ def assert_stopped(bench) -> None:  # type: ignore[no-untyped-def]
 
 def test_a_run_ends_by_time_with_the_radius_found(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=6"])
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert outcome.at_rest
     assert 6.0 <= outcome.ended_s - outcome.started_s < 6.5
@@ -31,7 +31,7 @@ def test_a_run_ends_by_time_with_the_radius_found(tmp_path: Path) -> None:
 
 def test_a_run_ends_by_itself_when_it_has_converged(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=60", "run.until_converged=true"])
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.CONVERGED
     assert outcome.ended_s < 10.0
     assert outcome.remaining_fraction < bench.config.run.converged_fraction
@@ -41,7 +41,7 @@ def test_a_run_ends_by_itself_when_it_has_converged(tmp_path: Path) -> None:
 
 def test_a_stop_request_ramps_down_within_the_acceleration_limit(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, stop_requested=lambda clock: clock.now_s() >= 2.0)
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.INTERRUPTED
     assert outcome.at_rest
     times = np.array([t for t, _ in bench.arm.commands])
@@ -56,7 +56,7 @@ def test_a_stop_request_ramps_down_within_the_acceleration_limit(tmp_path: Path)
 
 def test_the_first_command_is_small_and_speed_builds_up_smoothly(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=1"])
-    bench.loop.run()
+    bench.run()
     first_moving = next(twist for _, twist in bench.arm.commands if np.any(twist))
     limit = bench.config.safety.max_linear_acceleration_m_s2
     assert np.linalg.norm(first_moving[:3]) <= limit * 0.01 * (1 + 1e-6)
@@ -65,7 +65,7 @@ def test_the_first_command_is_small_and_speed_builds_up_smoothly(tmp_path: Path)
 def test_no_motion_before_the_target_has_been_seen(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.vision.hidden = lambda t_s: t_s < 1.0
-    bench.loop.run()
+    bench.run()
     first_moving_s = next(t for t, twist in bench.arm.commands if np.any(twist))
     assert first_moving_s >= 1.0
 
@@ -73,7 +73,7 @@ def test_no_motion_before_the_target_has_been_seen(tmp_path: Path) -> None:
 def test_a_target_never_seen_ends_the_run_without_motion(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.vision.hidden = lambda t_s: True
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TARGET_LOST
     assert "hidden by the test" in outcome.target_state
     assert not any(np.any(twist) for _, twist in bench.arm.commands)
@@ -86,7 +86,7 @@ def test_a_lost_target_stops_the_arm_first_and_the_run_later(tmp_path: Path, fau
         bench.vision.hidden = lambda t_s: t_s > 2.0
     else:
         bench.vision.frozen_from_s = 2.0
-    outcome = bench.loop.run()
+    outcome = bench.run()
     # Images without the target lose it; no images at all are the camera's failure.
     if fault == "hidden":
         assert outcome.ending is Ending.TARGET_LOST
@@ -105,7 +105,7 @@ def test_a_lost_target_stops_the_arm_first_and_the_run_later(tmp_path: Path, fau
 def test_a_target_seen_again_in_time_is_measured_to_the_end(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=9"])
     bench.vision.hidden = lambda t_s: 2.0 < t_s < 3.0
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert bench.data.updates[-1].radius_m == pytest.approx(RADIUS_M, rel=2e-3)
 
@@ -113,7 +113,7 @@ def test_a_target_seen_again_in_time_is_measured_to_the_end(tmp_path: Path) -> N
 def test_a_broken_arm_ends_the_run_and_is_told_to_stop(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.arm.fail_at_s = 1.5
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.DEVICE_FAILURE
     assert "cable" in str(outcome.error)
     assert not outcome.at_rest  # nobody can say: it reports nothing
@@ -123,7 +123,7 @@ def test_a_broken_arm_ends_the_run_and_is_told_to_stop(tmp_path: Path) -> None:
 def test_a_broken_camera_ends_the_run_with_the_arm_at_rest(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.vision.error_at_s = 1.5
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.DEVICE_FAILURE
     assert outcome.at_rest
     assert_stopped(bench)
@@ -132,7 +132,7 @@ def test_a_broken_camera_ends_the_run_with_the_arm_at_rest(tmp_path: Path) -> No
 def test_an_arm_that_stops_reporting_is_a_device_failure(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.arm.silent_from_s = 1.5
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.DEVICE_FAILURE
     limit_s = bench.config.safety.max_state_age_s
     assert max(t for t, twist in bench.arm.commands if np.any(twist)) < 1.5 + limit_s + 0.02
@@ -149,7 +149,7 @@ def test_a_crash_anywhere_in_the_loop_stops_the_arm(
 
     bench = make_bench(tmp_path, on_tick=crash)
     with pytest.raises(kind):
-        bench.loop.run()
+        bench.run()
     assert_stopped(bench)
 
 
@@ -163,7 +163,7 @@ def test_a_loop_that_hangs_leaves_an_arm_that_stops_by_itself(tmp_path: Path) ->
             bench.clock.sleep_until(stalled_at_s + 1.0)
 
     bench = make_bench(tmp_path, ["safety.target_lost_after_s=3", "run.duration_s=3"], on_tick=hang)
-    outcome = bench.loop.run()
+    outcome = bench.run()
     hold_s = bench.config.arm.hold_s
     during = [
         s for s in bench.arm.history if stalled_at_s + hold_s + 0.01 < s.t_s < stalled_at_s + 1.0
@@ -177,21 +177,19 @@ def test_the_same_run_writes_the_same_log(tmp_path: Path) -> None:
     logs = []
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        make_bench(tmp_path / name, ["run.duration_s=2"]).loop.run()
-        logs.append((tmp_path / name / "log.jsonl").read_bytes())
+        make_bench(tmp_path / name, ["run.duration_s=2"]).run()
+        logs.append(log_bytes(tmp_path / name))
     assert logs[0] == logs[1]
     assert len(logs[0]) > 100_000
 
 
 def events(run_dir: Path) -> list[tuple[str, str]]:
     """The names and details of the log's events."""
-    lines = (run_dir / "log.jsonl").read_text(encoding="utf-8").splitlines()
-    records = [json.loads(line) for line in lines]
-    return [(r["event"], r["detail"]) for r in records if r["kind"] == "event"]
+    return [(r["event"], r["detail"]) for r in log_lines(run_dir) if r["kind"] == "event"]
 
 
 def test_the_log_tells_every_state_of_a_run(tmp_path: Path) -> None:
-    make_bench(tmp_path, ["run.duration_s=1"]).loop.run()
+    make_bench(tmp_path, ["run.duration_s=1"]).run()
     names = [name for name, _ in events(tmp_path) if name.startswith("state")]
     assert names == ["state running", "state stopping", "state stopped"]
 
@@ -205,7 +203,7 @@ def test_a_loop_held_up_holds_the_arm_and_starts_again_from_rest(tmp_path: Path)
             bench.clock.sleep_until(hung[0] + 0.5)
 
     bench = make_bench(tmp_path, ["run.duration_s=3"], on_tick=hang)
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert outcome.holds == 1
     assert "held up" in outcome.last_hold
@@ -216,7 +214,7 @@ def test_a_loop_held_up_holds_the_arm_and_starts_again_from_rest(tmp_path: Path)
 
 def test_a_wall_in_the_way_holds_the_arm_and_keeps_the_measurement(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=6", "safety.workspace_min_m=[-0.12,-2,0.05]"])
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert outcome.holds == 1
     assert "workspace x min" in outcome.last_hold
@@ -228,7 +226,7 @@ def test_a_wall_in_the_way_holds_the_arm_and_keeps_the_measurement(tmp_path: Pat
 def test_a_wall_ends_the_run_where_that_is_wanted(tmp_path: Path) -> None:
     wall = ["safety.workspace_min_m=[-0.05,-2,0.05]", "safety.reactions.envelope=stop"]
     bench = make_bench(tmp_path, wall)
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.SAFETY_STOP
     assert "workspace x min" in str(outcome.error)
     assert ("state fault", str(outcome.error)) in events(tmp_path)
@@ -237,7 +235,7 @@ def test_a_wall_ends_the_run_where_that_is_wanted(tmp_path: Path) -> None:
 
 def test_an_estimate_that_images_contradict_stops_the_run(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=9", "safety.max_residual=1e-9"])
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.SAFETY_STOP
     assert "diverged" in str(outcome.error)
     assert_stopped(bench)
@@ -255,7 +253,7 @@ def test_a_camera_that_pauses_is_waited_for(tmp_path: Path) -> None:
             bench.vision.seq = int(bench.clock.now_s() * 30)
 
     bench.loop._on_tick = resume
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert outcome.holds == 1
     assert "no image" in outcome.last_hold
@@ -267,6 +265,6 @@ def test_a_camera_that_pauses_is_waited_for(tmp_path: Path) -> None:
 
 def test_a_held_arm_does_not_unsettle_what_has_settled(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=9", "safety.workspace_min_m=[-0.25,-2,0.05]"])
-    outcome = bench.loop.run()
+    outcome = bench.run()
     assert outcome.holds == 1
     assert outcome.remaining_fraction < 5e-3

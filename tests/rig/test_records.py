@@ -1,6 +1,5 @@
 """The run directory: what is in it, and what is refused."""
 
-import json
 from collections import Counter
 from pathlib import Path
 
@@ -10,14 +9,15 @@ from drivers.errors import ConfigError
 from rig.config_load import load_config
 from rig.records import make_figures_dir, make_run_dir, write_summary
 from tests.rig.fakes import make_bench
+from tests.rig.log_lines import log_lines
 
 
 def test_the_log_holds_every_sample_of_every_kind(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=1"])
-    bench.loop.run()
-    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    bench.run()
+    lines = log_lines(tmp_path)
     kinds = Counter(line["kind"] for line in lines)
-    assert set(kinds) == {"arm", "frame", "update", "estimate", "command", "event"}
+    assert set(kinds) == {"arm", "frame", "update", "estimate", "command", "event", "tick"}
     assert kinds["arm"] == len(bench.data.arm_states)
     assert kinds["frame"] == bench.data.frames
     assert kinds["update"] == len(bench.data.updates)

@@ -14,6 +14,7 @@ import pytest
 
 from rig.summary import JSON_KEYS
 from tests.rig.command_line import rig
+from tests.rig.log_lines import log_bytes, log_lines
 
 RASTER = ("--set", "sim.renderer=raster")
 
@@ -54,7 +55,7 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_another(tmp_path: Pat
                 out=tmp_path / name,
             )
         )
-        logs.append((tmp_path / name / "log.jsonl").read_bytes())
+        logs.append(log_bytes(tmp_path / name))
         assert results[-1]["seed"] == int(seed)
         del results[-1]["wall_s"], results[-1]["run_dir"]
     assert results[0] == results[1]
@@ -185,7 +186,7 @@ def test_ctrl_c_in_real_time_ramps_the_arm_to_rest(number: int, tmp_path: Path) 
         process.kill()
     assert process.returncode == 130
     assert json.loads(output)["target"] == "sphere"
-    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    lines = log_lines(tmp_path)
     assert lines[-1]["kind"] == "event" and lines[-1]["detail"] == "interrupted"
     speeds = [np.linalg.norm(line["twist_tool"][:3]) for line in lines if line["kind"] == "arm"]
     assert max(speeds) > 0.03

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks.bench_lateness import compare
 from tests.rig.command_line import RIG
+from tests.rig.log_lines import log_lines
 from tests.rig.vision.discs import CLOCK
 
 pytestmark = pytest.mark.slow
@@ -59,7 +60,7 @@ def test_a_run_whose_vision_dies_stops_the_arm_and_says_so(
     assert json.loads(stdout)["radius_m"] is None
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["arm_at_rest"]
-    log = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").open()]
+    log = log_lines(tmp_path / "run")
     noticed_s = next(line["t_s"] for line in log if "died" in line.get("detail", ""))
     assert noticed_s - killed_s < 0.1
 

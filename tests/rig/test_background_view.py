@@ -1,84 +1,15 @@
-"""What threads do for the loop: nothing is lost, nothing is held up, no error is swallowed."""
+"""What the view's thread does for the loop: nothing is held up, no error is swallowed."""
 
-import io
 import threading
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import pytest
 
-from rig.background_file import BackgroundFile
 from rig.background_view import BackgroundView
 from rig.outcome import LiveStatus
 
 PATIENCE_S = 10.0
-
-
-class StuckFile(io.StringIO):
-    """A file on a disk that is busy until a test says otherwise."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reached = threading.Event()
-        self.free = threading.Event()
-
-    def write(self, text: str) -> int:
-        self.reached.set()
-        assert self.free.wait(PATIENCE_S)
-        return super().write(text)
-
-
-class FullFile(io.StringIO):
-    """A file on a disk with no space left."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reached = threading.Event()
-
-    def write(self, text: str) -> int:
-        self.reached.set()
-        raise OSError(28, "No space left on device")
-
-
-def test_everything_written_is_in_the_file_in_order(tmp_path: Path) -> None:
-    path = tmp_path / "log"
-    file = BackgroundFile(path.open("w", encoding="utf-8"))
-    lines = [f"line {number} → ü\n" for number in range(5000)]
-    for line in lines:
-        file.write(line)
-    file.close()
-    assert path.read_text(encoding="utf-8") == "".join(lines)
-
-
-def test_a_file_nothing_was_written_to_is_empty_and_closed(tmp_path: Path) -> None:
-    inner = (tmp_path / "log").open("w", encoding="utf-8")
-    BackgroundFile(inner).close()
-    assert inner.closed
-
-
-def test_a_busy_disk_holds_up_nobody() -> None:
-    slow = StuckFile()
-    file = BackgroundFile(slow)
-    file.write("a")
-    assert slow.reached.wait(PATIENCE_S)
-    file.write("b")  # would wait for ever if it waited
-    file.flush()
-    slow.free.set()
-    slow.close = lambda: None  # type: ignore[method-assign]
-    file.close()
-    assert slow.getvalue() == "ab"
-
-
-def test_a_full_disk_is_an_error_of_a_later_write_and_of_close() -> None:
-    full = FullFile()
-    file = BackgroundFile(full)
-    file.write("a")
-    assert full.reached.wait(PATIENCE_S)
-    with pytest.raises(OSError, match="No space left"):
-        file.close()
-    with pytest.raises(OSError, match="No space left"):
-        file.write("b")
 
 
 class Screen:
