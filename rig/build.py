@@ -195,7 +195,7 @@ def load_entry(entry: str) -> object:
 
 def given_geometry(config: RigConfig, devices: Devices | None) -> tuple[Intrinsics, FloatArray]:
     """The calibration of the configuration, or else what the devices were delivered with."""
-    intrinsics, T_tool_camera = _intrinsics(config), _hand_eye(config)
+    intrinsics, T_tool_camera = intrinsics_of(config), hand_eye_of(config)
     if devices is not None:
         intrinsics = intrinsics or devices.intrinsics
         T_tool_camera = devices.T_tool_camera if T_tool_camera is None else T_tool_camera
@@ -207,7 +207,8 @@ def given_geometry(config: RigConfig, devices: Devices | None) -> tuple[Intrinsi
     return intrinsics, T_tool_camera
 
 
-def _intrinsics(config: RigConfig) -> Intrinsics | None:
+def intrinsics_of(config: RigConfig) -> Intrinsics | None:
+    """The given calibration's intrinsics."""
     given = config.calibration.intrinsics
     if given is None:
         return None
@@ -216,7 +217,8 @@ def _intrinsics(config: RigConfig) -> Intrinsics | None:
     )
 
 
-def _hand_eye(config: RigConfig) -> FloatArray | None:
+def hand_eye_of(config: RigConfig) -> FloatArray | None:
+    """The given calibration's T_tool_camera (4, 4)."""
     given = config.calibration
     if given.tool_camera_xyz_m is None or given.tool_camera_rotvec_rad is None:
         return None

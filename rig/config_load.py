@@ -39,9 +39,17 @@ def load_config(
     _overlay(tree, overlays.get(target) or {})
     _overlay(tree, experiment or {})
     _validate(tree, str(path))
-    for assignment in assignments or []:
+    return configured(tree, assignments or [], "the configuration")
+
+
+def configured(tree: Tree, assignments: list[str], where: str) -> RigConfig:
+    """``assignments`` laid over ``tree``, which is changed, and validated.
+
+    Raises ConfigError that begins with ``where`` and names the key.
+    """
+    for assignment in assignments:
         _assign(tree, assignment)
-    return _validate(tree, "the configuration")
+    return _validate(tree, where)
 
 
 def dump_config(config: RigConfig) -> str:

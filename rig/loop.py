@@ -95,7 +95,8 @@ class RunLoop:
         ended_s = self._clock.now_s()
         if at_rest and error is None:
             self._enter(RigState.STOPPED, ending.value)
-        self._log.event(ended_s, "ended", ending.value if error is None else str(error))
+        why = ending.value if error is None else f"{ending.value}: {error}"
+        self._log.event(ended_s, "ended", why)
         return RunOutcome(
             ending=ending,
             data=self._data,

@@ -18,7 +18,7 @@ from rig.build import Rig, build_rig
 from rig.config import MotionConfig, RigConfig, TargetKind
 from rig.deadman import Deadman
 from rig.envelope import Envelope
-from rig.fusion import Fusion
+from rig.fusion import Fusion, FusionLog
 from rig.live import View
 from rig.log.header import LogHeader
 from rig.log.recorder import Recorded
@@ -67,14 +67,7 @@ def execute(
         write_config(run_dir, config)
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
         # What has to be compiled is compiled here, before time counts.
-        fusion = Fusion(
-            make_observer(config, target),
-            data,
-            log,
-            # Above the age at which the supervisor calls the states stale, in better words.
-            2.0 * config.safety.max_state_age_s,
-            config.calibration.latency_s,
-        )
+        fusion = make_fusion(config, target, data, log)
         controller = make_controller(config.motion)
         envelope = Envelope(config.safety, rig.T_tool_camera, rig.intrinsics)
         wall: Clock = WallClock()
@@ -163,6 +156,14 @@ def make_observer(config: RigConfig, target: TargetKind) -> Observer:
     model = Sphere() if target == "sphere" else Cylinder()
     estimator = config.estimator
     return Observer(model, estimator.alpha, estimator.damping, estimator.radius_guess_m)
+
+
+def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: FusionLog) -> Fusion:
+    """The estimator and what feeds it, as the configuration asks for."""
+    # Above the age at which the supervisor calls the states stale, in better words.
+    max_extrapolation_s = 2.0 * config.safety.max_state_age_s
+    latency_s = config.calibration.latency_s
+    return Fusion(make_observer(config, target), data, log, max_extrapolation_s, latency_s)
 
 
 def make_controller(motion: MotionConfig) -> Controller:

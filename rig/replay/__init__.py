@@ -1,0 +1,1 @@
+"""A recorded run repeated offline by the code that runs live: the same, or with other settings."""

@@ -1,0 +1,43 @@
+"""Whether a replay says what the run said, to the last bit."""
+
+from itertools import zip_longest
+
+import numpy as np
+
+from estimator.estimate import Estimate
+from rig.replay.engine import Kept
+
+
+def first_difference(recorded: Kept, replayed: Kept) -> str:
+    """Where the two part, in words; "" when every bit is the same."""
+    for name, a, b in (
+        ("update", recorded.updates, replayed.updates),
+        ("prediction", recorded.predictions, replayed.predictions),
+    ):
+        for number, (one, other) in enumerate(zip_longest(a, b)):
+            if one is None or other is None:
+                return f"{len(a)} {name}s were recorded, {len(b)} come from the replay"
+            if not _same(one, other):
+                return (
+                    f"{name} {number} at {one.t_s:.6f} s: recorded 1/R = {one.chi!r}, "
+                    f"replayed {other.chi!r} at {other.t_s:.6f} s"
+                )
+    return ""
+
+
+def _same(one: Estimate, other: Estimate) -> bool:
+    if (one.axis is None) != (other.axis is None):
+        return False
+    if one.axis is not None and other.axis is not None and not _equal(one.axis, other.axis):
+        return False
+    return _equal(_numbers(one), _numbers(other))
+
+
+def _numbers(estimate: Estimate) -> np.ndarray:
+    variance = np.nan if estimate.variance is None else estimate.variance
+    numbers = (estimate.t_s, estimate.chi, estimate.residual, estimate.extrapolated_s, variance)
+    return np.array([*numbers, *estimate.s])
+
+
+def _equal(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.array_equal(one, other, equal_nan=True))
