@@ -1,9 +1,10 @@
 """A log as a replay needs it: what the run was, and what came in, in order."""
 
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 import yaml
@@ -88,7 +89,7 @@ class Recording:
         """The recorded configuration with ``a.b=value`` laid over; raises ConfigError."""
         where = f"{self.log.path}, recorded by {PROGRAM} {self.version} (this is "
         where += f"{versions()['version']}), has a configuration that does not fit"
-        return configured(yaml.safe_load(yaml.safe_dump(self.tree)), assignments or [], where)
+        return configured(deepcopy(self.tree), assignments or [], where)
 
     def steps(self, images: bool) -> Iterator[Step]:
         """What happened, in the order the loop saw it; ``images`` decodes the pixels too."""
@@ -133,7 +134,8 @@ class _Arm:
         self._t_std_s = values.get("t_std_s", self._t_std_s)
         if "twist_std" in values:
             self._twist_std = np.array(values["twist_std"])
-        pose = np.vstack((values["T_base_tool"], [0.0, 0.0, 0.0, 1.0]))
+        pose = np.eye(4)
+        pose[:3] = values["T_base_tool"]
         twist = np.array(values["twist_tool"])
         return ArmState(values["t_s"], pose, twist, self._t_std_s, self._twist_std)
 
@@ -146,9 +148,7 @@ def open_recording(path: Path) -> Recording:
     log = open_log(path)
     program, run = log.metadata.get(PROGRAM), log.metadata_values("run")
     if program is None:
-        raise ConfigError(
-            f"{log.path} cannot be replayed: no metadata {PROGRAM!r}; not a rig's log"
-        )
+        raise ConfigError(f"{log.path} cannot be replayed: it is no log of {PROGRAM}")
     version = program.get("version", "an unknown version")
     if program.get("format") != str(LOG_FORMAT):
         raise ConfigError(
@@ -166,13 +166,13 @@ def open_recording(path: Path) -> Recording:
             f"{log.path} cannot be replayed: it looks at {target!r}, and this version knows "
             f"{', '.join(get_args(TargetKind))}"
         )
-    lens = geometry["intrinsics"]
+    fx_px, fy_px, cx_px, cy_px, *distortion = geometry["intrinsics"]
     return Recording(
         log=log,
         version=version,
-        target=target,
+        target=cast(TargetKind, target),
         tree=yaml.safe_load(log.attachments[CONFIG_NAME]),
-        intrinsics=Intrinsics(*lens[:4], np.array(lens[4:])),
+        intrinsics=Intrinsics(fx_px, fy_px, cx_px, cy_px, np.array(distortion)),
         T_tool_camera=np.array(geometry["T_tool_camera"]),
         renderer=run.get("renderer"),
         radius_true_m=run.get("radius_true_m"),
