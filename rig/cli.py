@@ -10,7 +10,9 @@ from rig.commands.calibrate import calibrate_app
 from rig.commands.camera import camera_app
 from rig.commands.doctor import EXIT_CODES as DOCTOR_EXIT_CODES
 from rig.commands.doctor import doctor
+from rig.commands.log import log_app
 from rig.commands.measure import measure
+from rig.commands.replay import replay
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
 from rig.commands.sim import sim_app
@@ -28,11 +30,13 @@ app = typer.Typer(
 )
 app.command(epilog=HELP)(run)
 app.command()(measure)
+app.command()(replay)
 app.command(epilog=HELP)(reproduce)
 app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")
 app.add_typer(arm_app, name="arm")
+app.add_typer(log_app, name="log")
 app.add_typer(sim_app, name="sim")
 
 

@@ -117,10 +117,23 @@ def table(summary: Mapping[str, Json]) -> Table:
             f"{_number(summary['wall_s'], '{:.2f} s')}",
         ),
         ("renderer, seed", f"{summary['renderer'] or '–'}, {summary['seed']}"),
+        ("log", _log(summary)),
         ("run directory", str(summary["run_dir"])),
     ]:
         out.add_row(name, value)
     return out
+
+
+def _log(summary: Mapping[str, Json]) -> str:
+    """What was recorded, and what was not."""
+    size = summary.get("log_bytes")
+    if not isinstance(size, int):
+        return "–"
+    text = f"{size / 1e6:.1f} MB, {summary['images_recorded']} images"
+    if summary["images_not_recorded"]:
+        text += f", {summary['images_not_recorded']} dropped: the disk was too slow"
+    error = summary["log_error"]
+    return text if error is None else f"{text}, ended early: {error}"
 
 
 def _number(value: Json, pattern: str, factor: float = 1.0) -> str:

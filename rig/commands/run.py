@@ -57,7 +57,7 @@ def run(
     ] = None,
 ) -> None:
     """Move the camera, estimate the target's radius and pose, write a run directory."""
-    from rig.calibrated import calibrated
+    from rig.calibrated import calibrated, calibration_path
     from rig.config_load import load_config
     from rig.records import make_run_dir, write_summary
     from rig.report import write_report
@@ -74,18 +74,24 @@ def run(
     run_dir = make_run_dir(out, target)
     console = Console(stderr=as_json)
     with StopRequest() as stop_requested:
-        result = execute(config, target, run_dir, realtime, view_for(console), stop_requested)
-    write_summary(run_dir, result.summary)
+        result = execute(
+            *(config, target, run_dir, realtime, view_for(console), stop_requested),
+            attachments=tuple(path for path in [calibration_path(config)] if str(path) == source),
+        )
     if as_json:
         print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
     console.print(table(result.summary))
-    write_report(
-        run_dir / "report.png",
-        _title(target, result),
-        result.analysis,
-        result.outcome.data,
-        result.intrinsics,
-    )
+    try:
+        write_summary(run_dir, result.summary)
+        write_report(
+            run_dir / "report.png",
+            _title(target, result),
+            result.analysis,
+            result.outcome.data,
+            result.intrinsics,
+        )
+    except OSError as error:  # what was measured stands all the same
+        warn(f"warning: {run_dir} is not complete: {error}")
     _explain(result)
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
@@ -112,5 +118,8 @@ def _explain(result: "RunResult") -> None:
             f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
             "error is left; run longer, faster or with a larger estimator.alpha"
         )
+    lost = result.summary["images_not_recorded"]
+    if lost:
+        warn(f"warning: the disk was too slow for {lost} images, which are not in the log")
     if not outcome.at_rest:
         warn("warning: the arm was not seen at rest after its stop; check it before coming near")

@@ -3,11 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
+from rig.log.columns import FOR_VIEWERS
 from rig.log.reader import Log
 from rig.log.topics import RECORDS
-
-# What only viewers need of an event.
-_FOR_VIEWERS = ("timestamp", "level", "message", "name", "file", "line")
 
 
 def lines(log: Log) -> Iterator[dict[str, Any]]:
@@ -15,5 +13,5 @@ def lines(log: Log) -> Iterator[dict[str, Any]]:
     for record in log.records(RECORDS):
         values = record.values()
         if record.kind == "event":
-            values = {key: value for key, value in values.items() if key not in _FOR_VIEWERS}
+            values = {key: value for key, value in values.items() if key not in FOR_VIEWERS}
         yield {"kind": record.kind, **values, "logged_ns": record.logged_ns}

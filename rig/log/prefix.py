@@ -1,20 +1,31 @@
-"""How far an MCAP file is whole, and a stream that ends there.
+"""The whole records of an MCAP file, also of one that ends anywhere.
 
-A file whose writer was killed ends anywhere, also inside a record; what follows the last whole
-record must not be taken for data.
+A file whose writer was killed may stop inside a record; what follows the last whole one must not
+be taken for data. The official reader refuses such files, so the outermost layer (an opcode, a
+length, that many bytes) is walked here; what is in the records is read by the official classes.
 """
 
 import io
 import struct
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from drivers.errors import ConfigError
 
 _HEAD = struct.Struct("<BQ")  # opcode, length
+_READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
+    Opcode.SCHEMA: Schema.read,
+    Opcode.CHANNEL: Channel.read,
+    Opcode.CHUNK: Chunk.read,
+    Opcode.ATTACHMENT: Attachment.read,
+    Opcode.METADATA: Metadata.read,
+}
 
 
 def whole_until(file: IO[bytes]) -> tuple[int, bool]:
@@ -41,25 +52,22 @@ def whole_until(file: IO[bytes]) -> tuple[int, bool]:
             return end, file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
 
 
-class Prefix(io.RawIOBase):
-    """The first ``end`` bytes of a file, read as if there were no more."""
+def data_section(path: Path, end: int) -> Iterator[McapRecord]:
+    """The records that hold data, chunks closed, up to ``end`` or the index."""
+    with path.open("rb") as file:
+        at = file.seek(len(MCAP0_MAGIC))
+        while at + _HEAD.size <= end:
+            opcode, length = _HEAD.unpack(file.read(_HEAD.size))
+            at += _HEAD.size + length
+            if opcode == Opcode.DATA_END:
+                return
+            if opcode in _READ:
+                yield _READ[opcode](_stream(file, length))
+            elif opcode == Opcode.MESSAGE:
+                yield Message.read(_stream(file, length), length)
+            else:
+                file.seek(at)
 
-    def __init__(self, path: Path, end: int) -> None:
-        self._file = path.open("rb")
-        self._left = end
 
-    def readable(self) -> bool:
-        """It is."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` as far as there is something."""
-        view = memoryview(buffer)[: self._left]
-        count = self._file.readinto(view)
-        self._left -= count
-        return int(count)
-
-    def close(self) -> None:
-        """Close the file too."""
-        self._file.close()
-        super().close()
+def _stream(file: IO[bytes], length: int) -> ReadDataStream:
+    return ReadDataStream(io.BytesIO(file.read(length)))

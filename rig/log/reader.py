@@ -1,10 +1,8 @@
 """Reading a log, also one that its writer never finished."""
 
-import io
 import json
 import struct
 from collections.abc import Collection, Iterator
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,19 +12,17 @@ from mcap.records import (
     Attachment,
     Channel,
     Chunk,
-    DataEnd,
     McapRecord,
     Message,
     Metadata,
-    Schema,
 )
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import breakup_chunk
 from zstandard import ZstdError
 
 from drivers.errors import ConfigError
 from drivers.interfaces import GreyImage
 from rig.log.pixels import image_of
-from rig.log.prefix import Prefix, whole_until
+from rig.log.prefix import data_section, whole_until
 from rig.log.run_log import LOG_NAME
 from rig.log.topics import BY_NAME, Topic
 
@@ -73,6 +69,11 @@ class Log:
     end: int  # bytes that can be read
     damaged_chunks: int = field(default=0)  # met by the last ``records``
 
+    @property
+    def path_bytes(self) -> int:
+        """The file's size."""
+        return self.path.stat().st_size
+
     def metadata_values(self, name: str) -> dict[str, Any]:
         """A metadata record whose texts are JSON; empty when there is none."""
         return {key: json.loads(text) for key, text in self.metadata.get(name, {}).items()}
@@ -96,19 +97,16 @@ class Log:
 
     def raw(self) -> Iterator[McapRecord]:
         """Everything of the data section, chunks opened."""
-        with closing(Prefix(self.path, self.end)) as stream:
-            for item in _whole(stream):
-                if isinstance(item, DataEnd):
-                    return
-                if not isinstance(item, Chunk):
-                    yield item
-                    continue
-                try:
-                    inner = breakup_chunk(item, validate_crc=True)
-                except _DAMAGE:
-                    self.damaged_chunks += 1
-                    continue
-                yield from inner
+        for item in data_section(self.path, self.end):
+            if not isinstance(item, Chunk):
+                yield item
+                continue
+            try:
+                inner = breakup_chunk(item, validate_crc=True)
+            except _DAMAGE:
+                self.damaged_chunks += 1
+                continue
+            yield from inner
 
 
 def find_log(path: Path) -> Path:
@@ -135,20 +133,11 @@ def open_log(path: Path) -> Log:
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error}") from error
     log = Log(path, finished, {}, {}, end)
-    with closing(Prefix(path, end)) as stream:
-        for item in _whole(stream):
-            if isinstance(item, Metadata):
-                log.metadata[item.name] = item.metadata
-            elif isinstance(item, Attachment):
-                log.attachments[item.name] = item.data
-            elif isinstance(item, Chunk | Schema | Channel | Message | DataEnd):
-                break  # they stand at the beginning
+    for item in data_section(path, end):
+        if isinstance(item, Metadata):
+            log.metadata[item.name] = item.metadata
+        elif isinstance(item, Attachment):
+            log.attachments[item.name] = item.data
+        else:
+            break  # they stand at the beginning
     return log
-
-
-def _whole(stream: io.RawIOBase) -> Iterator[McapRecord]:
-    """The top records up to the stream's end or the first that is no record."""
-    try:
-        yield from StreamReader(stream, emit_chunks=True, record_size_limit=None).records
-    except _DAMAGE:
-        return
