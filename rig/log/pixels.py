@@ -50,7 +50,8 @@ def image_of(message: CompressedImage | RawImage) -> GreyImage:
 
     Raises ValueError for one that cannot be decoded.
     """
-    if isinstance(message, RawImage):
+    # By name: readers that make their classes from the file's schema have others of that name.
+    if message.DESCRIPTOR.full_name == RawImage.DESCRIPTOR.full_name:
         pixels = np.frombuffer(message.data, dtype=np.uint8)
         return pixels.reshape(message.height, message.step)[:, : message.width].copy()
     pixels = np.frombuffer(message.data, dtype=np.uint8)
