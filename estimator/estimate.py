@@ -1,5 +1,6 @@
 """What an estimator says: the target's state at an instant, and the interface it answers by."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -19,7 +20,8 @@ class Correction(Enum):
     INITIALISED = "initialised"  # the first image: ŝ = s, χ̂ from the guess
     APPLIED = "applied"
     STALE = "stale"  # not later than the last image: ignored, the state is as it was
-    RESTARTED = "restarted"  # the motion since the last image is forgotten: χ̂ kept, ŝ = s
+    RESTARTED = "restarted"  # what joins the images before to this one is lost: χ̂ kept, ŝ = s
+    REJECTED = "rejected"  # contradicts the prediction: ignored, the state is as it was
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +35,31 @@ class Estimate:
     variance: float | None  # of chi; None when the estimator has no notion of it
     residual: float  # norm of what the last image contradicted the prediction by, unit of s
     extrapolated_s: float = 0.0  # how far the arm's motion was extrapolated to get here
+    covariance: FloatArray | None = None  # (4, 4) of (s, chi), where it is known
+    image_covariance: FloatArray | None = None  # (3, 3) of s as the last image showed it
+    doubt: str = ""  # why the images and the motion do not go together, if they do not
 
     @property
     def radius_m(self) -> float | None:
         """R = 1/χ̂, or None while χ̂ is not positive (an underdamped transient crosses zero)."""
         return 1.0 / self.chi if self.chi > 0.0 else None
+
+    @property
+    def radius_std_m(self) -> float | None:
+        """Half the width of R's 68 % interval; None where it is unknown or has no upper end."""
+        low_m, high_m = self.radius_interval_m(1.0)
+        return None if high_m is None or low_m is None else 0.5 * (high_m - low_m)
+
+    def radius_interval_m(self, deviations: float) -> tuple[float | None, float | None]:
+        """R where χ̂ is taken so many standard deviations up and down: never negative.
+
+        The upper end is None while χ may be zero, both while the variance is unknown.
+        """
+        if self.variance is None:
+            return None, None
+        half = deviations * math.sqrt(self.variance)
+        low_m = 1.0 / (self.chi + half) if self.chi + half > 0.0 else None
+        return low_m, 1.0 / (self.chi - half) if self.chi - half > 0.0 else None
 
 
 class Estimator(Protocol):

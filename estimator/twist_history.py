@@ -51,6 +51,8 @@ class TwistHistory:
         self._twists = np.empty((_FIRST_CAPACITY, 6))
         self._first = 0
         self._end = 0
+        # Covariance (6, 6) of a recorded twist; None: nobody said how uncertain they are.
+        self.covariance: FloatArray | None = None
         # Compiles the kernel now rather than in the middle of a run.
         _cut(np.zeros(1), np.zeros((1, 6)), 0, 1, 0.0, 0.0)
 
@@ -68,6 +70,11 @@ class TwistHistory:
         """The newest recorded instant; raises MotionUnknownError while empty."""
         self._require_samples()
         return float(self._times_s[self._end - 1])
+
+    @property
+    def sample_s(self) -> float:
+        """The mean time from one kept sample to the next; 0 for fewer than two."""
+        return (self.end_s - self.start_s) / (len(self) - 1) if len(self) > 1 else 0.0
 
     def append(self, t_s: float, twist_camera: ArrayLike) -> None:
         """Record one twist (6,); raises ValueError unless ``t_s`` is later than all before."""

@@ -32,6 +32,8 @@ class Analysis:
     rms_vs_ideal: float | None  # of |z(0)|
     time_to_1pct_s: float | None  # also None when it was never reached for good
     relative_error: float | None
+    chi_std: FloatArray | None  # (k,) as stated, 1/m
+    nees: float | None  # (z / chi_std)² at the end
 
 
 def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> Analysis:
@@ -48,9 +50,10 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         radius_m = 1.0 / updates.chi
     if radius_true_m is not None and len(t_s) > 1:
         z = 1.0 / radius_true_m - updates.chi
-        z_ideal = _ideal(motion_t_s, sigma2, config, float(z[0]), t_s)
-        if z[0] != 0.0:  # a perfect guess leaves no transient to compare
-            rms = rms_vs_ideal(t_s, z, z_ideal)
+        if config.estimator.kind == "observer":  # no other estimator promises (5)
+            z_ideal = _ideal(motion_t_s, sigma2, config, float(z[0]), t_s)
+            if z[0] != 0.0:  # a perfect guess leaves no transient to compare
+                rms = rms_vs_ideal(t_s, z, z_ideal)
         relative_errors = radius_m / radius_true_m - 1.0
         to_1pct = time_to_within(t_s, relative_errors, 0.01)
         relative = float(relative_errors[-1])
@@ -72,7 +75,16 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         rms_vs_ideal=rms,
         time_to_1pct_s=to_1pct,
         relative_error=relative,
+        chi_std=None if updates.variance is None else np.sqrt(updates.variance),
+        nees=_nees(z, updates),
     )
+
+
+def _nees(z: FloatArray | None, updates: UpdateTrack) -> float | None:
+    """The normalised error squared at the end: 1 on average where the stated variance is true."""
+    if z is None or updates.variance is None:
+        return None
+    return float(z[-1] ** 2 / updates.variance[-1])
 
 
 def _ideal(

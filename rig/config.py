@@ -9,19 +9,40 @@ from rig.config_calibration import CalibrationConfig
 from rig.config_devices import ArmConfig, CameraConfig, SimArm, SimCamera
 from rig.config_log import LogConfig
 from rig.config_safety import SafetyConfig
-from rig.config_section import Finite, NotNegative, Section
+from rig.config_section import Finite, NotNegative, Positive, Section
 from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
 
 
 class EstimatorConfig(Section):
-    """The observer's gains and its first guess."""
+    """Which estimator, its first guess, and what it needs to know."""
 
-    kind: Literal["observer"] = "observer"
+    kind: Literal["observer", "kalman"] = "observer"
+    # Of the observer.
     alpha: Annotated[float, Field(gt=0, le=1e6)] = 2000.0
     damping: Annotated[float, Field(gt=0, le=20)] = 1.0  # multiple of c* = 2 sqrt(alpha) sigma
     radius_guess_m: Annotated[float, Field(gt=0, le=10)] = 0.03
+    # The range that the radius is sure to lie in; left out: a third to three times the guess.
+    radius_range_m: tuple[Positive, Positive] | None = None
+    # Standard deviations of a measured twist, for arms that do not report theirs.
+    twist_std_m_s: NotNegative = 2e-4
+    twist_std_rad_s: NotNegative = 5e-4
+
+    @model_validator(mode="after")
+    def _guess_in_range(self) -> Self:
+        low_m, high_m = self.radius_range
+        if not low_m <= self.radius_guess_m <= high_m:
+            raise ValueError(
+                f"radius_guess_m = {self.radius_guess_m:g} is not in "
+                f"radius_range_m = [{low_m:g}, {high_m:g}]"
+            )
+        return self
+
+    @property
+    def radius_range(self) -> tuple[float, float]:
+        """The least and the largest radius to expect, in m."""
+        return self.radius_range_m or (self.radius_guess_m / 3.0, self.radius_guess_m * 3.0)
 
 
 class MotionConfig(Section):
@@ -40,12 +61,14 @@ class RunConfig(Section):
     duration_s: Annotated[float, Field(gt=0, le=3600)] = 6.0
     control_rate_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     until_converged: bool = False
+    # End once the stated 95 % interval of R is inside ± this share; not for the observer.
+    until_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     # Where images are measured; auto: for a real camera in a process of its own.
     vision: Literal["auto", "thread", "process"] = "auto"
     # Whether the control loop asks the system for real-time priority; auto: where it is allowed.
     scheduling: Literal["auto", "normal", "realtime"] = "auto"
-    # Converged: the predicted rest of the transient and the drift of R over the last second
-    # are both below this fraction.
+    # Converged: the predicted rest of the observer's transient and the drift of R over the last
+    # second, or another estimator's 95 % interval of R, are below this fraction.
     converged_fraction: Annotated[float, Field(gt=0, lt=1)] = 0.002
 
 
@@ -72,6 +95,11 @@ class RigConfig(Section):
             raise ValueError(
                 f"motion.velocity_m_s asks for {speed_m_s:.3g} m/s, above "
                 f"safety.max_linear_speed_m_s = {self.safety.max_linear_speed_m_s:.3g}"
+            )
+        if self.run.until_share is not None and self.estimator.kind == "observer":
+            raise ValueError(
+                "run.until_share (--until) needs an estimator that states how sure it is: "
+                "set estimator.kind=kalman; the observer has run.until_converged"
             )
         if self.arm.hold_s <= 1.0 / self.run.control_rate_hz:
             raise ValueError(

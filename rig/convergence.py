@@ -1,16 +1,78 @@
 """Whether the estimate has settled, judged without knowing the truth."""
 
+from typing import Protocol
+
 import numpy as np
 
+from estimator.estimate import Estimate
 from estimator.gain import REST_SIGMA, damping_rates
 from estimator.second_order import exact_step
 from rig.config import RigConfig
 from rig.run_data import RunData
 
 _WINDOW_S = 1.0
+# Of a normal distribution, 95 % lie within so many standard deviations.
+DEVIATIONS_95 = 1.96
+# Fewer images cannot have shown whether they agree.
+_FEWEST_IMAGES = 6
 
 
-class Convergence:
+class Convergence(Protocol):
+    """Judges, from the updates so far, how near the end the estimate is."""
+
+    @property
+    def remaining_fraction(self) -> float:
+        """By which share the estimate may still be off, at most 1."""
+        ...
+
+    def update(self) -> None:
+        """Take the updates made since the last call into account."""
+        ...
+
+    def reached(self) -> bool:
+        """Whether the estimate is as good as the configuration asks for."""
+        ...
+
+
+def make_convergence(config: RigConfig, data: RunData) -> Convergence:
+    """What fits the configured estimator: its stated interval, or its predicted transient."""
+    if config.estimator.kind == "observer":
+        return TransientConvergence(config, data)
+    return IntervalConvergence(config, data)
+
+
+def interval_share(estimate: Estimate) -> float:
+    """How far the ends of the stated 95 % interval of R are from R̂, as a share of it."""
+    radius_m = estimate.radius_m
+    low_m, high_m = estimate.radius_interval_m(DEVIATIONS_95)
+    if radius_m is None or low_m is None or high_m is None:
+        return float("inf")
+    return max(high_m / radius_m - 1.0, 1.0 - low_m / radius_m)
+
+
+class IntervalConvergence:
+    """Follows the stated 95 % interval of the radius."""
+
+    def __init__(self, config: RigConfig, data: RunData) -> None:
+        run = config.run
+        self._share = run.converged_fraction if run.until_share is None else run.until_share
+        self._data = data
+        self.remaining_fraction = 1.0
+
+    def update(self) -> None:
+        """Look at the newest update."""
+        if self._data.updates:
+            self.remaining_fraction = min(1.0, interval_share(self._data.updates[-1]))
+
+    def reached(self) -> bool:
+        """Whether the interval is inside the share asked for, and nothing contradicts it."""
+        updates = self._data.updates
+        if len(updates) < _FEWEST_IMAGES or updates[-1].doubt:
+            return False
+        return self.remaining_fraction <= self._share
+
+
+class TransientConvergence:
     """Follows the transient that (5) predicts for the measured motion, and the drift of R̂.
 
     The transient starts at 1 with the first image and is integrated with the σ1² of each

@@ -64,6 +64,8 @@ class Fusion:
         self._waiting: deque[Sighting] = deque()
         self._periods_s: deque[float] = deque(maxlen=_PERIODS)
         self._newest_image: tuple[int, float] | None = None  # seq and exposure instant
+        self._twist_std: FloatArray | None = None  # as the arm last reported it
+        self._doubt = ""
         self.state: ArmState | None = None
         self.last_image_s: float | None = None  # when the newest image was handled
         self.last_feature_s: float | None = None  # when the newest one used was exposed
@@ -76,6 +78,7 @@ class Fusion:
             return
         twists = np.array([state.twist_tool for state in states])
         self._motion.extend([state.t_s for state in states], twists @ self._camera_from_tool.T)
+        self._note_uncertainty(states[-1])
         self._data.arm_states.extend(states)
         self._log.states(states)
         self.state = states[-1]
@@ -139,6 +142,13 @@ class Fusion:
                 self._periods_s.append(passed_s / (seq - self._newest_image[0]))
         self._newest_image = (seq, t_s)
 
+    def _note_uncertainty(self, state: ArmState) -> None:
+        """Tell the estimator how uncertain twists are, where the arm knows it."""
+        if state.twist_std is not None and state.twist_std is not self._twist_std:
+            self._twist_std = state.twist_std
+            spread = self._camera_from_tool * state.twist_std
+            self._motion.covariance = spread @ spread.T
+
     def _covered(self, t_s: float) -> bool:
         return self.state is not None and self.state.t_s >= t_s
 
@@ -151,11 +161,18 @@ class Fusion:
         if correction is Correction.STALE:
             self._log.event(t_s, "stale image", f"frame {sighting.frame.seq} was not used")
             return
-        if correction is Correction.RESTARTED:
-            self._log.event(t_s, "estimator restarted", "the target was out of sight too long")
+        self.last_feature_s = t_s
+        if correction is Correction.REJECTED:
+            self._log.event(t_s, "outlier", f"frame {sighting.frame.seq} was not used")
+            return
         update = self._estimator.estimate
         assert update is not None  # it has just been corrected
-        self.last_feature_s = t_s
+        if correction is Correction.RESTARTED:
+            why = update.doubt or "the target was out of sight too long"
+            self._log.event(t_s, "estimator restarted", why)
+        if update.doubt != self._doubt:
+            self._doubt = update.doubt
+            self._log.event(t_s, "estimate doubted", update.doubt or "no longer")
         self._data.updates.append(update)
         self._data.add_snapshot(Snapshot(t_s, sighting.frame.image, feature))
         self._log.estimate("update", update)

@@ -12,7 +12,7 @@ from estimator.active.controller import Controller
 from estimator.estimate import Estimate
 from rig.commander import Commander
 from rig.config import RigConfig
-from rig.convergence import Convergence
+from rig.convergence import make_convergence
 from rig.deadman import Deadman
 from rig.frames import twist_map
 from rig.fusion import Fusion
@@ -64,7 +64,7 @@ class RunLoop:
         self._tool_from_camera = twist_map(data.T_tool_camera)
         self._watch = Watch(config, fusion, vision)
         self._supervisor = Supervisor(config.safety)
-        self._convergence = Convergence(config, data)
+        self._convergence = make_convergence(config, data)
         self._stats = TickStats()
         self._started_s = 0.0
         self._last_s = 0.0  # the tick before this one
@@ -204,7 +204,8 @@ class RunLoop:
         if self._first_feature_s is not None:
             if now_s - self._first_feature_s >= run.duration_s:
                 return Verdict(RigState.STOPPING, ending=Ending.TIME)
-            if run.until_converged and self._convergence.reached():
+            asked = run.until_converged or run.until_share is not None
+            if asked and self._convergence.reached():
                 return Verdict(RigState.STOPPING, ending=Ending.CONVERGED)
         return None
 

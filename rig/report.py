@@ -53,14 +53,16 @@ def draw_transient(
     axes: Axes, analysis: Analysis, label: str = "z", colour: str = MEASURED
 ) -> None:
     """The estimation error z(t) = 1/R − χ̂ with the response (5) promises, as in figs. 3a, 4, 5c."""
-    if analysis.z is None or analysis.z_ideal is None:
+    if analysis.z is None:
         axes.plot(analysis.t_s, analysis.chi, color=colour, label="χ̂")
         axes.set(title="estimate χ̂ (true radius unknown)", xlabel="t [s]", ylabel="χ̂ [1/m]")
         return
     axes.plot(analysis.t_s, analysis.z, color=colour, label=label)
-    axes.plot(analysis.t_s, analysis.z_ideal, "--", color=IDEAL, linewidth=1)
+    if analysis.z_ideal is not None:
+        axes.plot(analysis.t_s, analysis.z_ideal, "--", color=IDEAL, linewidth=1)
     axes.axhline(0.0, color="grey", linewidth=0.5)
-    axes.set(title="estimation error z (dashed: ideal)", xlabel="t [s]", ylabel="z [1/m]")
+    dashed = "" if analysis.z_ideal is None else " (dashed: ideal)"
+    axes.set(title=f"estimation error z{dashed}", xlabel="t [s]", ylabel="z [1/m]")
     axes.legend()
 
 

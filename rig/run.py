@@ -8,7 +8,9 @@ from pathlib import Path
 from drivers.clock import Clock, WallClock, time_of_day_offset_ns
 from estimator.active.controller import Controller
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
+from estimator.estimate import Estimator
 from estimator.image.intrinsics import Intrinsics
+from estimator.kalman import KalmanFilter, RadiusPrior, TwistNoise
 from estimator.models.cylinder import Cylinder
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
@@ -151,11 +153,15 @@ def _of_log(recorded: Recorded) -> dict[str, Json]:
     }
 
 
-def make_observer(config: RigConfig, target: TargetKind) -> Observer:
+def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
     """The estimator that the configuration asks for."""
     model = Sphere() if target == "sphere" else Cylinder()
     estimator = config.estimator
-    return Observer(model, estimator.alpha, estimator.damping, estimator.radius_guess_m)
+    if estimator.kind == "observer":
+        return Observer(model, estimator.alpha, estimator.damping, estimator.radius_guess_m)
+    prior = RadiusPrior(estimator.radius_guess_m, *estimator.radius_range)
+    noise = TwistNoise(estimator.twist_std_m_s, estimator.twist_std_rad_s)
+    return KalmanFilter(model, prior, noise)
 
 
 def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: FusionLog) -> Fusion:

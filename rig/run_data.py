@@ -45,6 +45,7 @@ class UpdateTrack:
     s: FloatArray  # (k, 3)
     axis: FloatArray | None  # (k, 3), cylinder only
     residual: FloatArray  # (k,)
+    variance: FloatArray | None  # (k,) of chi, where the estimator states it
 
 
 @dataclass(slots=True)
@@ -94,6 +95,10 @@ class RunData:
         along = 0.0 if update.axis is None else float(update.axis @ v)
         return max(float(v @ v) - along**2, 0.0)
 
+    def doubts(self) -> list[str]:
+        """Everything that the estimator found to contradict itself, in order."""
+        return list(dict.fromkeys(update.doubt for update in self.updates if update.doubt))
+
     def arm_track(self) -> ArmTrack:
         """The camera's measured motion over the whole run."""
         twists = np.array([state.twist_tool for state in self.arm_states]).reshape(-1, 6)
@@ -107,10 +112,12 @@ class RunData:
     def update_track(self) -> UpdateTrack:
         """The estimator's states, one per image used."""
         axes = [update.axis for update in self.updates if update.axis is not None]
+        variances = [update.variance for update in self.updates if update.variance is not None]
         return UpdateTrack(
             t_s=np.array([update.t_s for update in self.updates]),
             chi=np.array([update.chi for update in self.updates]),
             s=np.array([update.s for update in self.updates]).reshape(-1, 3),
             axis=np.array(axes) if len(axes) == len(self.updates) and axes else None,
             residual=np.array([update.residual for update in self.updates]),
+            variance=np.array(variances) if len(variances) == len(self.updates) else None,
         )

@@ -19,6 +19,8 @@ JSON_KEYS = (
     "relative_error",
     "rms_vs_ideal",
     "time_to_1pct_s",
+    "radius_std_m",
+    "nees",
     "frames",
     "frames_lost",
     "ticks",
@@ -63,6 +65,8 @@ def summarise(
         "relative_error": None if radius_m is None else analysis.relative_error,
         "rms_vs_ideal": analysis.rms_vs_ideal,
         "time_to_1pct_s": analysis.time_to_1pct_s,
+        "radius_std_m": None if radius_m is None else outcome.data.updates[-1].radius_std_m,
+        "nees": None if radius_m is None else analysis.nees,
         "frames": outcome.data.frames,
         "frames_lost": outcome.data.frames_lost,
         "ticks": outcome.stats.ticks,
@@ -76,6 +80,7 @@ def summarise(
         "ending": outcome.ending.value,
         "error": None if outcome.error is None else str(outcome.error),
         "target_state": outcome.target_state,
+        "doubts": outcome.data.doubts(),
         "holds": outcome.holds,
         "last_hold": outcome.last_hold,
         "arm_at_rest": outcome.at_rest,
@@ -96,7 +101,7 @@ def table(summary: Mapping[str, Json]) -> Table:
     if isinstance(position, list):
         where = " ".join(_number(value, "{:.4f}") for value in position) + " m (base)"
     for name, value in [
-        ("radius", _number(summary["radius_m"], "{:.4f} mm", 1e3)),
+        ("radius", _radius(summary)),
         ("true radius", _number(summary["radius_true_m"], "{:.4f} mm", 1e3)),
         ("relative error", _number(summary["relative_error"], "{:+.3f} %", 1e2)),
         ("position", where),
@@ -134,6 +139,13 @@ def _log(summary: Mapping[str, Json]) -> str:
         text += f", {summary['images_not_recorded']} dropped: the disk was too slow"
     error = summary["log_error"]
     return text if error is None else f"{text}, ended early: {error}"
+
+
+def _radius(summary: Mapping[str, Json]) -> str:
+    """The radius with its standard deviation where the estimator states one."""
+    radius = _number(summary["radius_m"], "{:.4f} mm", 1e3)
+    std_m = summary["radius_std_m"]
+    return radius if std_m is None else f"{radius} ± {_number(std_m, '{:.4f} mm', 1e3)} (1σ)"
 
 
 def _number(value: Json, pattern: str, factor: float = 1.0) -> str:

@@ -37,6 +37,12 @@ def run(
     until_converged: Annotated[
         bool, typer.Option("--until-converged", help="End as soon as the estimate has settled.")
     ] = False,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHARE", help="End when the 95 % interval of R is within ± this, as 0.5%."
+        ),
+    ] = None,
     realtime: Annotated[
         bool,
         typer.Option(
@@ -69,6 +75,7 @@ def run(
     extra += [] if duration is None else [f"run.duration_s={duration!r}"]
     extra += [] if seed is None else [f"sim.seed={seed}"]
     extra += ["run.until_converged=true"] if until_converged else []
+    extra += [] if until is None else [f"run.until_share={_share(until)!r}"]
     config, source = calibrated(load_config(target, rig, extra), uncalibrated)
     warn(f"calibration: {source}")
     run_dir = make_run_dir(out, target)
@@ -98,6 +105,18 @@ def run(
         raise typer.Exit(code)
 
 
+def _share(text: str) -> float:
+    """What ``0.5%`` or ``0.005`` means."""
+    number, percent, rest = text.strip().partition("%")
+    try:
+        value = float(number) / (100.0 if percent else 1.0)
+    except ValueError:
+        value = 0.0
+    if rest or not 0.0 < value < 1.0:
+        raise typer.BadParameter(f"--until {text!r}: write it as 0.5% or 0.005")
+    return value
+
+
 def _title(target: str, result: "RunResult") -> str:
     """The headline of the report."""
     radius, true = result.summary["radius_m"], result.summary["radius_true_m"]
@@ -113,6 +132,8 @@ def _explain(result: "RunResult") -> None:
         warn(f"error: {outcome.error}")
     elif result.summary["radius_m"] is None:
         warn(f"no radius: {outcome.ending.value}; {outcome.target_state}")
+    elif result.summary["radius_std_m"] is not None:
+        _explain_interval(result)
     elif outcome.remaining_fraction > _SETTLED:
         warn(
             f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
@@ -123,3 +144,12 @@ def _explain(result: "RunResult") -> None:
         warn(f"warning: the disk was too slow for {lost} images, which are not in the log")
     if not outcome.at_rest:
         warn("warning: the arm was not seen at rest after its stop; check it before coming near")
+
+
+def _explain_interval(result: "RunResult") -> None:
+    """Say what is wrong with an estimate that comes with its uncertainty."""
+    for doubt in result.outcome.data.doubts():
+        warn(f"doubtful: {doubt}")
+    share = result.outcome.remaining_fraction
+    if share > _SETTLED:
+        warn(f"uncertain: the 95 % interval of the radius is ± {100 * share:.0f} %; move further")
