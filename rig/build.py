@@ -53,6 +53,7 @@ class Devices:
     T_tool_camera: FloatArray | None  # (4, 4)
     renderer: str | None  # None on real hardware
     truth: Truth | None  # None on real hardware
+    features: Vision | None  # sees without images; where set, the camera is not for use
     everything_ready: Callable[[], None]  # to be called when vision is: time begins to matter
 
 
@@ -137,11 +138,13 @@ def open_remote_camera(
 
 
 def _simulated(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
-    apart = realtime and config.run.vision != "thread"
+    apart = realtime and config.run.vision != "thread" and config.sim.level == "pixels"
     devices = open_simulated(config, target, realtime, apart)
     intrinsics, T_tool_camera = given_geometry(config, devices)
     vision: Vision
-    if devices.camera is None:
+    if devices.features is not None:
+        vision = devices.features
+    elif devices.camera is None:
         vision = ProcessVision(Job(config, target, intrinsics), devices.clock, devices.feed)
     else:
         here = ThreadedVision if realtime else InlineVision

@@ -2,7 +2,6 @@
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -12,13 +11,10 @@ from drivers.errors import OperateError
 from drivers.interfaces import Frame
 from sim_backend.config import CameraConfig
 from sim_backend.exposure import Exposure
+from sim_backend.frame_grid import FrameGrid
 from sim_backend.lens import Lens, vignetting_gain
 from sim_backend.renderer import Renderer
 from sim_backend.sensor import expose
-
-# Frames looked at in one go when searching for the newest; jitter never reorders further.
-_JITTER_LIMIT_SIGMAS = 3.0
-_FRAMES_REMEMBERED = 256
 
 
 class Timeline(Protocol):
@@ -61,16 +57,11 @@ class SimulatedCamera:
         self._seed = seed
         # Compiles the kernel now rather than in the middle of a run.
         expose(np.zeros((1, 4), np.float32), self._gain[:1, :4], 0.0, 0)
-        self._period_s = 1.0 / config.rate_hz
-        # From the first light on any row, or to the last, to the frame's instant.
-        self._half_s = (config.exposure_s + config.row_time_s * (config.height - 1)) / 2
-        self._first_s = world.clock.now_s() + self._half_s
+        self._grid = FrameGrid(config, world.clock.now_s(), seed)
         self._last_seq = -1
         self._closed = False
         self._darkroom = ThreadPoolExecutor(1, thread_name_prefix="sim-camera")
         self._ahead: dict[int, Future[Frame]] = {}  # by number, all above the last returned
-        # Asked for every frame at every look; the answer costs two random numbers.
-        self._readable_s = lru_cache(maxsize=_FRAMES_REMEMBERED)(self._drawn_readable_s)
 
     def read(self, timeout_s: float) -> Frame | None:
         """The newest readable frame not returned before; see ``drivers.interfaces.Camera``."""
@@ -81,11 +72,11 @@ class SimulatedCamera:
         last_look = False
         while True:
             now_s = self._world.sync()
-            seq = self._newest_readable(now_s)
+            seq = self._grid.newest_readable(now_s, self._last_seq)
             if seq is not None:
                 return self._taken(seq, now_s)
             self._take_ahead(now_s)
-            next_s = self._next_readable_s()
+            next_s = self._grid.next_readable_s(self._last_seq)
             if last_look:
                 return None
             clock.sleep_until(min(next_s, deadline_s))
@@ -112,17 +103,17 @@ class SimulatedCamera:
 
     def _take_ahead(self, now_s: float) -> None:
         """Begin with the newest frame that is exposed, unless another is being worked on."""
-        seq = self._newest_exposed(now_s)
+        seq = self._grid.newest_exposed(now_s)
         if seq <= self._last_seq or seq in self._ahead or not self._idle():
             return
-        if self._readable_s(seq) < math.inf:
+        if self._grid.readable_s(seq) < math.inf:
             self._ahead[seq] = self._darkroom.submit(self._take, seq)
 
     def _idle(self) -> bool:
         return all(frame.done() for frame in self._ahead.values())
 
     def _take(self, seq: int) -> Frame:
-        mid_s = self._mid_s(seq)
+        mid_s = self._grid.mid_s(seq)
         radiance = self._exposure.render(self._renderer, mid_s)
         key = int(np.random.default_rng([self._seed, 2, seq]).integers(1 << 63))
         return Frame(
@@ -132,41 +123,3 @@ class SimulatedCamera:
             seq=seq,
             stamp_source="sim",
         )
-
-    def _mid_s(self, seq: int) -> float:
-        return self._first_s + seq * self._period_s
-
-    def _drawn_readable_s(self, seq: int) -> float:
-        """When frame ``seq`` can be read; never (infinity) if it is dropped."""
-        c = self._config
-        if c.latency_jitter_s == 0.0 and c.drop_probability == 0.0:
-            return self._mid_s(seq) + max(c.latency_s, self._half_s)
-        random = np.random.default_rng([self._seed, 3, seq])
-        if random.random() < c.drop_probability:
-            return math.inf
-        limit = _JITTER_LIMIT_SIGMAS
-        jitter_s = c.latency_jitter_s * min(max(random.standard_normal(), -limit), limit)
-        return self._mid_s(seq) + max(c.latency_s + jitter_s, self._half_s)
-
-    def _newest_exposed(self, now_s: float) -> int:
-        """The highest frame number whose last light has fallen by now."""
-        return math.floor((now_s - self._half_s - self._first_s) / self._period_s + 1e-9)
-
-    def _newest_readable(self, now_s: float) -> int | None:
-        """The highest frame number above the last one returned that is readable now."""
-        for seq in range(self._newest_exposed(now_s), self._last_seq, -1):
-            if self._readable_s(seq) <= now_s + 1e-9:
-                return seq
-        return None
-
-    def _next_readable_s(self) -> float:
-        """When the next frame above the last one returned becomes readable."""
-        c = self._config
-        soonest_s = math.inf
-        seq = self._last_seq + 1
-        least_s = max(c.latency_s - _JITTER_LIMIT_SIGMAS * c.latency_jitter_s, self._half_s)
-        # Later frames can overtake only while even their shortest delay could be sooner.
-        while self._mid_s(seq) + least_s < soonest_s:
-            soonest_s = min(soonest_s, self._readable_s(seq))
-            seq += 1
-        return soonest_s

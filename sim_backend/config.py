@@ -100,6 +100,18 @@ class CameraConfig(Section):
         return self
 
 
+class FeatureConfig(Section):
+    """How well images would show the target, where none are drawn (``level: features``)."""
+
+    # Standard deviation of the outline's half-size; 0.002 is what clean images give, 0.01 hard
+    # ones. What it is of all else follows from the geometry.
+    noise_px: NotNegative = 0.002
+    lost_probability: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    # Outliers have noise so many times as large, and do not say so.
+    outlier_probability: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    outlier_size: NotNegative = 30.0
+
+
 class ArmConfig(Section):
     """The gantry: its drives, its limits and what its controller reports."""
 
@@ -121,6 +133,9 @@ class SimConfig(Section):
 
     seed: Annotated[int, Field(ge=0)] = 1
     renderer: Literal["auto", "gl", "raster"] = "auto"
+    # features: no images at all; what measuring them would have found, with noise. For many runs.
+    level: Literal["pixels", "features"] = "pixels"
+    features: FeatureConfig = FeatureConfig()
     sphere: SphereConfig = SphereConfig()
     cylinder: CylinderConfig = CylinderConfig()
     board: BoardConfig = BoardConfig()

@@ -8,9 +8,11 @@ from drivers.clock import Clock
 from drivers.errors import ConfigError
 from drivers.interfaces import Camera
 from sim_backend.arm import SimulatedArm
+from sim_backend.blank_camera import BlankCamera
 from sim_backend.camera import SimulatedCamera
 from sim_backend.config import SimConfig
 from sim_backend.exposure import Exposure
+from sim_backend.features import FeatureSource
 from sim_backend.kinematics import JOINT_HIGH, JOINT_LOW, joints_for
 from sim_backend.lens import Lens, lens_of
 from sim_backend.motion import CameraMotion
@@ -29,7 +31,8 @@ class SimulatedRig:
     """A camera on a gantry in front of one target.
 
     ``T_tool_camera`` (4, 4) and ``intrinsics`` (fx, fy, cx, cy in px, distortion (5,)) are the
-    calibration a real rig would have been given; ``truth`` is for tests and reports only. With
+    calibration a real rig would have been given; ``truth`` is for tests and reports only.
+    ``features`` is what its images show where ``config.level`` does without them. With
     ``camera_elsewhere`` the camera is simulated in another process, which follows ``feed``.
 
     Raises ConfigError where the start cannot be reached, ConnectError where the renderer asked
@@ -45,14 +48,23 @@ class SimulatedRig:
         except ValueError as error:
             raise ConfigError(str(error)) from error
         scene = build_scene(config, target)
-        self.renderer_name = choose_renderer(config.renderer, target)
+        self.features: FeatureSource | None = None
+        blind = config.level == "features"
+        if blind and target == "board":
+            raise ConfigError(
+                "sim.level = features knows no board: leave it at pixels to calibrate"
+            )
+        chosen = None if blind else choose_renderer(config.renderer, target)
+        self.renderer_name = "none" if chosen is None else chosen
         self.T_tool_camera = mount(config)
         start = getattr(config, target).start
         T_base_tool = start_pose(scene.target, start, lens) @ np.linalg.inv(self.T_tool_camera)
         q_start = joints_for(T_base_tool)
         _check_reachable(q_start, target)
         # First what takes long: on the wall clock the world starts to move with its creation.
-        renderer = None if camera_elsewhere else make_renderer(self.renderer_name, scene, lens)
+        renderer = None
+        if chosen is not None and not camera_elsewhere:
+            renderer = make_renderer(chosen, scene, lens)
         self._world = World(config.arm, q_start, clock)
         motion = CameraMotion(self._world, self.T_tool_camera)
         self.arm = SimulatedArm(config.arm, self._world, config.seed)
@@ -64,6 +76,10 @@ class SimulatedRig:
             )
             self._camera = stamped(camera, config.camera)
         self.truth = Truth(scene.target, self._world, motion)
+        if blind:
+            blank = BlankCamera(config.camera, clock, config.seed)
+            self._camera = stamped(blank, config.camera)
+            self.features = FeatureSource(config.features, self.truth, lens, config.seed)
         self.intrinsics = _plain(lens)
 
     @property
