@@ -193,3 +193,34 @@ def test_ctrl_c_in_real_time_ramps_the_arm_to_rest(number: int, tmp_path: Path) 
     assert speeds[-1] < 2e-3
     allowed = [line["allowed"] for line in lines if line["kind"] == "command"]
     assert not np.any(allowed[-1])
+
+
+@pytest.mark.parametrize("target", ["sphere", "cylinder"])
+def test_the_kalman_filter_states_an_interval_and_ends_when_it_is_narrow(
+    target: str, tmp_path: Path
+) -> None:
+    settings = ("--set", "estimator.kind=kalman", "--set", "sim.level=features")
+    result = run_json("--target", target, *settings, "--until", "0.5%", out=tmp_path)
+    assert tuple(result) == JSON_KEYS
+    assert result["rms_vs_ideal"] is None
+    assert result["sim_s"] < 1.0
+    assert 0.0 < 1.96 * result["radius_std_m"] <= 0.005 * result["radius_m"]
+    assert abs(result["radius_m"] - result["radius_true_m"]) < 4.0 * result["radius_std_m"]
+    assert result["nees"] < 16.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--until", "0.5%"), "estimator.kind=kalman"),
+        (("--until", "half"), "0.5%"),
+        (("--set", "estimator.radius_range_m=[0.05, 0.1]"), "radius_guess_m"),
+    ],
+)
+def test_an_interval_that_nobody_states_cannot_end_a_run(
+    arguments: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
+    result = rig("run", "--target", "sphere", "--out", str(tmp_path / "run"), *arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert not (tmp_path / "run").exists()
