@@ -12,7 +12,7 @@ from estimator.image.intrinsics import Intrinsics
 from estimator.image.tracker import TargetTracker, warm_up
 from rig.analysis import Analysis, analyse
 from rig.config import RigConfig
-from rig.convergence import Convergence
+from rig.convergence import make_convergence
 from rig.outcome import Ending, RunOutcome
 from rig.records import Json
 from rig.replay.recording import Estimated, Event, Recording, Seen, States, Tick
@@ -113,7 +113,7 @@ class _Worker:
         self._recording = recording
         self._data = data
         self._fusion = make_fusion(config, recording.target, data, kept)
-        self._convergence = Convergence(config, data)
+        self._convergence = make_convergence(config, data)
         self._vision = vision
         self.recorded = Kept()
         self.images_missing = 0
