@@ -51,9 +51,8 @@ def main() -> None:
             )
             print(f" {1e3 * everything:5.0f} ms in all a simulated second; {size:5.1f} MB a minute")
         for source in ("features", "images"):
-            print(
-                f"replay from {source:8}: {replaying(Path(folder) / 'png', source):5.1f} times real time"
-            )
+            speed = replaying(Path(folder) / "png", source)
+            print(f"replay from {source:8}: {speed:.1f} times real time")
 
 
 def handing_over(folder: Path, images: str) -> tuple[float, float]:
