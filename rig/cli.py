@@ -13,6 +13,7 @@ from rig.commands.doctor import doctor
 from rig.commands.log import log_app
 from rig.commands.measure import measure
 from rig.commands.replay import replay
+from rig.commands.report import report, runs
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
 from rig.commands.sim import sim_app
@@ -32,6 +33,8 @@ app.command(epilog=HELP)(run)
 app.command()(measure)
 app.command()(replay)
 app.command(epilog=HELP)(reproduce)
+app.command()(report)
+app.command()(runs)
 app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")

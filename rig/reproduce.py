@@ -8,11 +8,11 @@ import matplotlib.pyplot as plt
 from mpl_toolkits.mplot3d import Axes3D
 from pydantic import BaseModel, ConfigDict
 
-from rig import report
 from rig.config import TargetKind
 from rig.config_load import load_config, packaged_config, read_yaml
 from rig.live import View
 from rig.records import Json, make_run_dir, write_summary
+from rig.report import panels
 from rig.run import RunResult, execute
 
 FIGURES = ("fig3", "fig4", "fig5")
@@ -82,7 +82,7 @@ def draw_figure(path: Path, experiment: Experiment, results: list[RunResult]) ->
         axes = figure.add_subplot((n + 1) // 2, min(n, 2), index + 1, projection=projection)
         for curve, result in zip(experiment.curves, results, strict=True):
             if isinstance(axes, Axes3D):
-                report.draw_path(axes, result.analysis, curve.name, curve.colour)
+                panels.draw_path(axes, result.analysis, curve.name, curve.colour)
             else:
                 _DRAW[panel](axes, result.analysis, curve.name, curve.colour)
     figure.savefig(path, dpi=90)
@@ -90,10 +90,10 @@ def draw_figure(path: Path, experiment: Experiment, results: list[RunResult]) ->
 
 
 _DRAW = {
-    "transient": report.draw_transient,
-    "deviation": report.draw_deviation,
-    "sigma2": report.draw_sigma2,
-    "speed2": report.draw_speed2,
+    "transient": panels.draw_transient,
+    "deviation": panels.draw_deviation,
+    "sigma2": panels.draw_sigma2,
+    "speed2": panels.draw_speed2,
 }
 
 

@@ -1,11 +1,11 @@
 """One run from configuration to summary: build, loop, analyse, write."""
 
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.clock import Clock, WallClock, time_of_day_offset_ns
+from drivers.clock import Clock, WallClock, local_timestamp, time_of_day_offset_ns
 from estimator.active.controller import Controller
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.estimate import Estimator
@@ -28,6 +28,7 @@ from rig.log.run_log import open_run_log
 from rig.loop import RunLoop
 from rig.outcome import RunOutcome
 from rig.realtime import control_conditions
+from rig.recorded import RunSetup, write_setup
 from rig.records import Json, write_config
 from rig.rehearsal import rehearse
 from rig.run_data import RunData
@@ -52,9 +53,12 @@ def execute(
     realtime: bool,
     view: View,
     stop_requested: Callable[[], bool],
+    calibration: str = "as configured",
     attachments: tuple[Path, ...] = (),
 ) -> RunResult:
-    """Run once; the arm rests, and the log and configuration are written, when this returns.
+    """Run once; the arm rests, and everything but the summary is written, when this returns.
+
+    ``calibration`` says where the geometry in ``config`` is from.
 
     ``attachments`` are put into the log, such as the calibration's file.
 
@@ -67,6 +71,8 @@ def execute(
         open_run_log(run_dir, _header(rig, config, target, attachments), rig.clock) as log,
     ):
         write_config(run_dir, config)
+        setup = _setup(rig, target, calibration)
+        write_setup(run_dir, setup)
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
         # What has to be compiled is compiled here, before time counts.
         fusion = make_fusion(config, target, data, log)
@@ -108,6 +114,18 @@ def _header(
         radius_true_m=None if rig.truth is None else rig.truth.radius_m,
         offset_ns=time_of_day_offset_ns() if rig.realtime else 0,
         attachments=attachments,
+    )
+
+
+def _setup(rig: Rig, target: TargetKind, calibration: str) -> RunSetup:
+    return RunSetup(
+        target=target,
+        intrinsics=rig.intrinsics,
+        T_tool_camera=rig.T_tool_camera,
+        radius_true_m=None if rig.truth is None else rig.truth.radius_m,
+        renderer=rig.renderer,
+        calibration=calibration,
+        started_at=local_timestamp(),
     )
 
 

@@ -57,6 +57,9 @@ def run(
         ),
     ] = False,
     as_json: AsJson = False,
+    report: Annotated[
+        bool, typer.Option(help="Write report.html and report.png at the end.")
+    ] = True,
     out: Annotated[
         Path | None,
         typer.Option(help="The run directory to make; default: a new dated one below runs/."),
@@ -65,8 +68,9 @@ def run(
     """Move the camera, estimate the target's radius and pose, write a run directory."""
     from rig.calibrated import calibrated, calibration_path
     from rig.config_load import load_config
+    from rig.recorded import read_run
     from rig.records import make_run_dir, write_summary
-    from rig.report import write_report
+    from rig.report import write_reports
     from rig.run import execute
     from rig.stop_request import StopRequest
     from rig.summary import JSON_KEYS, table
@@ -82,7 +86,7 @@ def run(
     console = Console(stderr=as_json)
     with StopRequest() as stop_requested:
         result = execute(
-            *(config, target, run_dir, realtime, view_for(console), stop_requested),
+            *(config, target, run_dir, realtime, view_for(console), stop_requested, source),
             attachments=tuple(path for path in [calibration_path(config)] if str(path) == source),
         )
     if as_json:
@@ -90,13 +94,8 @@ def run(
     console.print(table(result.summary))
     try:
         write_summary(run_dir, result.summary)
-        write_report(
-            run_dir / "report.png",
-            _title(target, result),
-            result.analysis,
-            result.outcome.data,
-            result.intrinsics,
-        )
+        if report:
+            write_reports([read_run(run_dir)], run_dir)
     except OSError as error:  # what was measured stands all the same
         warn(f"warning: {run_dir} is not complete: {error}")
     _explain(result)
@@ -115,14 +114,6 @@ def _share(text: str) -> float:
     if rest or not 0.0 < value < 1.0:
         raise typer.BadParameter(f"--until {text!r}: write it as 0.5% or 0.005")
     return value
-
-
-def _title(target: str, result: "RunResult") -> str:
-    """The headline of the report."""
-    radius, true = result.summary["radius_m"], result.summary["radius_true_m"]
-    found = f"R̂ = {radius * 1e3:.3f} mm" if isinstance(radius, float) else "no radius"
-    known = f" (true {true * 1e3:.3f} mm)" if isinstance(true, float) else ""
-    return f"{target}: {found}{known}, {result.outcome.ending.value}"
 
 
 def _explain(result: "RunResult") -> None:

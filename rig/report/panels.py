@@ -1,12 +1,9 @@
-"""``report.png``: the panels of the paper's figures for one run."""
-
-from pathlib import Path
+"""The panels of the paper's figures, drawn with matplotlib; several runs lie over each other."""
 
 import matplotlib
 
 matplotlib.use("Agg")  # a file, on machines without a screen too
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from mpl_toolkits.mplot3d import Axes3D
@@ -14,39 +11,10 @@ from mpl_toolkits.mplot3d import Axes3D
 from estimator.image.intrinsics import Intrinsics
 from estimator.image.outline import outline_px
 from rig.analysis import Analysis
-from rig.run_data import RunData, Snapshot
+from rig.recorded.record import Picture
 
 MEASURED, IDEAL = "#1f5fa8", "black"
-_MARGINS = {
-    "left": 0.07,
-    "right": 0.985,
-    "bottom": 0.06,
-    "top": 0.91,
-    "wspace": 0.28,
-    "hspace": 0.25,
-}
 _AXIS_SHOWN_M = 0.12  # half the length drawn of a cylinder's axis
-
-
-def write_report(
-    path: Path, title: str, analysis: Analysis, data: RunData, intrinsics: Intrinsics
-) -> None:
-    """Draw all panels of one run into ``path`` (PNG)."""
-    figure = plt.figure(figsize=(15, 9))
-    figure.suptitle(title)
-    # Fixed margins: a layout that fits itself draws everything twice.
-    grid = figure.add_gridspec(2, 3, **_MARGINS)
-    draw_transient(figure.add_subplot(grid[0, 0]), analysis)
-    draw_sigma2(figure.add_subplot(grid[0, 1]), analysis)
-    draw_speed2(figure.add_subplot(grid[0, 2]), analysis)
-    draw_radius(figure.add_subplot(grid[1, 0]), analysis)
-    path_axes = figure.add_subplot(grid[1, 1], projection="3d")
-    assert isinstance(path_axes, Axes3D)
-    draw_path(path_axes, analysis)
-    start_s = data.updates[0].t_s if data.updates else 0.0
-    draw_image(figure.add_subplot(grid[1, 2]), data.newest_snapshot, intrinsics, start_s)
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
 
 
 def draw_transient(
@@ -54,7 +22,7 @@ def draw_transient(
 ) -> None:
     """The estimation error z(t) = 1/R − χ̂ with the response (5) promises, as in figs. 3a, 4, 5c."""
     if analysis.z is None:
-        axes.plot(analysis.t_s, analysis.chi, color=colour, label="χ̂")
+        axes.plot(analysis.t_s, analysis.chi, color=colour, label="χ̂" if label == "z" else label)
         axes.set(title="estimate χ̂ (true radius unknown)", xlabel="t [s]", ylabel="χ̂ [1/m]")
         return
     axes.plot(analysis.t_s, analysis.z, color=colour, label=label)
@@ -77,9 +45,9 @@ def draw_deviation(
     axes.set(title="deviation from the ideal response", xlabel="t [s]", ylabel="[% of z(0)]")
 
 
-def draw_radius(axes: Axes, analysis: Analysis) -> None:
+def draw_radius(axes: Axes, analysis: Analysis, label: str = "R̂", colour: str = MEASURED) -> None:
     """The estimated radius over time, with the true one and ± 1 % where it is known."""
-    axes.plot(analysis.t_s, analysis.radius_m * 1e3, color=MEASURED, label="R̂")
+    axes.plot(analysis.t_s, analysis.radius_m * 1e3, color=colour, label=label)
     final_mm = float(analysis.radius_m[-1]) * 1e3 if len(analysis.radius_m) else np.nan
     if analysis.radius_true_m is not None:
         true_mm = final_mm = analysis.radius_true_m * 1e3
@@ -132,18 +100,17 @@ def draw_path(
     axes.set(title="camera path, base frame", xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
 
 
-def draw_image(
-    axes: Axes, snapshot: Snapshot | None, intrinsics: Intrinsics, start_s: float
-) -> None:
-    """The newest image with the fitted outline."""
+def draw_image(axes: Axes, picture: Picture | None, intrinsics: Intrinsics, start_s: float) -> None:
+    """An image with the fitted outline."""
     axes.set_axis_off()
-    if snapshot is None:
-        axes.set_title("the target was never measured")
+    if picture is None:
+        axes.set_title("no image was kept")
         return
-    height, width = snapshot.image.shape
-    axes.imshow(snapshot.image, cmap="gray", vmin=0, vmax=255)
-    for line in outline_px(snapshot.feature, intrinsics, snapshot.image.shape):
+    image = picture.load()
+    axes.imshow(image, cmap="gray", vmin=0, vmax=255)
+    lines = [] if picture.feature is None else outline_px(picture.feature, intrinsics, image.shape)
+    for line in lines:
         axes.plot(line[:, 0], line[:, 1], color="#ff5533", linewidth=1.2)
-    axes.set(title=f"image at t = {snapshot.t_s - start_s:.2f} s with the fitted outline")
-    axes.set_xlim(-0.5, width - 0.5)
-    axes.set_ylim(height - 0.5, -0.5)
+    axes.set(title=f"image at t = {picture.t_s - start_s:.2f} s with the fitted outline")
+    axes.set_xlim(-0.5, image.shape[1] - 0.5)
+    axes.set_ylim(image.shape[0] - 0.5, -0.5)

@@ -1,0 +1,52 @@
+"""The report in a real browser: drawn, free of errors, and with the summary's numbers."""
+
+import json
+from pathlib import Path
+
+from tests.rig.browser import new_page
+from tests.rig.command_line import rig
+from tests.rig.report.recorded_runs import record
+
+FIGURES = {
+    *("radius", "path", "transient", "deviation", "residual", "sigma2", "speed2", "speed"),
+    *("events", "lateness", "latency"),
+}
+DRAWN = """() => Object.fromEntries([...document.querySelectorAll('.plot')].map(div => [div.id,
+  div.data.map(trace => trace.type).concat(
+    div.querySelector('canvas, .trace, .point') ? [] : ['nothing drawn'])]))"""
+
+
+def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> None:
+    summaries = [
+        record(tmp_path / "a", "--set", "sim.camera.drop_probability=0.2"),
+        record(tmp_path / "b", "--set", "estimator.alpha=8000", "--no-report"),
+    ]
+    assert (tmp_path / "a" / "report.html").is_file()
+    assert not (tmp_path / "b" / "report.html").exists()
+    both = tmp_path / "both"
+    runs = (str(tmp_path / "a"), str(tmp_path / "b"))
+    assert rig("report", *runs, "--out", str(both)).exit_code == 0
+    assert (both / "report.png").stat().st_size > 10_000
+    requests = []
+    with new_page() as page:
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto((both / "report.html").as_uri())
+        page.wait_for_selector("body[data-drawn]")
+        drawn = page.evaluate(DRAWN)
+        cells = page.eval_on_selector_all(
+            "td[data-key]", "cells => cells.map(c => [c.dataset.run, c.dataset.key, c.innerText])"
+        )
+        images = page.eval_on_selector_all("img", "images => images.map(i => i.naturalWidth)")
+        radii = page.eval_on_selector_all(".radius", "cards => cards.map(c => c.innerText)")
+        times = page.evaluate("document.getElementById('events').data[0].x")
+    assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert set(drawn) == FIGURES
+    assert not [name for name, kinds in drawn.items() if "nothing drawn" in kinds]
+    assert {"scatter3d", "cone", "surface"} <= set(drawn["path"])
+    for index, summary in enumerate(summaries):
+        shown = {key: json.loads(text) for run, key, text in cells if run == str(index)}
+        assert shown == summary
+        assert radii[index].startswith(f"{1e3 * summary['radius_m']:.4f}")
+    assert len(images) >= 6 and set(images) == {640}
+    log = [json.loads(line) for line in (tmp_path / "a" / "log.jsonl").read_text().splitlines()]
+    assert len(times) == len([entry for entry in log if entry["kind"] == "event"])
