@@ -7,6 +7,7 @@ from typing import Self
 from rig.live import View
 from rig.outcome import LiveStatus
 from rig.realtime import step_back
+from rig.recorded.setup import RunSetup
 
 _EVERY_S = 0.05
 _JOIN_TIMEOUT_S = 1.0  # a terminal that takes nothing must not keep the run from ending
@@ -22,6 +23,10 @@ class BackgroundView:
         self._error: Exception | None = None
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
+
+    def begin(self, setup: RunSetup) -> None:
+        """Hand it on, before time counts."""
+        self._view.begin(setup)
 
     def show(self, status: LiveStatus) -> None:
         """Take the newest state."""

@@ -67,6 +67,7 @@ class Fusion:
         self._twist_std: FloatArray | None = None  # as the arm last reported it
         self._doubt = ""
         self.state: ArmState | None = None
+        self.newest_sighting: Sighting | None = None
         self.last_image_s: float | None = None  # when the newest image was handled
         self.last_feature_s: float | None = None  # when the newest one used was exposed
         self.target_in_newest = False
@@ -89,6 +90,7 @@ class Fusion:
             self._data.add_frame(sighting.frame.seq, sighting.measurement.found)
             self._note_period(sighting.frame)
             self.last_image_s = now_s
+            self.newest_sighting = sighting
             self._log.frame(sighting, now_s)
             self.target_in_newest = sighting.measurement.found
             if sighting.measurement.found:

@@ -1,6 +1,7 @@
 """What a person sees while it runs: a table that updates in place, or a plain line a second."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -9,6 +10,7 @@ from rich.live import Live
 from rich.table import Table
 
 from rig.outcome import LiveStatus
+from rig.recorded.setup import RunSetup
 
 _REFRESH_S = 0.1
 _LINE_EVERY_S = 1.0
@@ -16,6 +18,10 @@ _LINE_EVERY_S = 1.0
 
 class View(Protocol):
     """Shows the run's state; called every tick, so it must be cheap."""
+
+    def begin(self, setup: RunSetup) -> None:
+        """Take what does not change while the run lasts; before the first state."""
+        ...
 
     def show(self, status: LiveStatus) -> None:
         """Take the newest state."""
@@ -63,8 +69,42 @@ class QuietView:
     ) -> None:
         return None
 
+    def begin(self, setup: RunSetup) -> None:
+        """Take it and drop it."""
+
     def show(self, status: LiveStatus) -> None:
         """Take the state and drop it."""
+
+
+class Views:
+    """Several views as one."""
+
+    def __init__(self, *views: View) -> None:
+        self._views = views
+        self._entered = ExitStack()
+
+    def __enter__(self) -> Self:
+        for view in self._views:
+            self._entered.enter_context(view)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._entered.close()
+
+    def begin(self, setup: RunSetup) -> None:
+        """Hand it to every one."""
+        for view in self._views:
+            view.begin(setup)
+
+    def show(self, status: LiveStatus) -> None:
+        """Hand it to every one."""
+        for view in self._views:
+            view.show(status)
 
 
 class PlainView:
@@ -85,6 +125,9 @@ class PlainView:
         traceback: TracebackType | None,
     ) -> None:
         return None
+
+    def begin(self, setup: RunSetup) -> None:
+        """Nothing of it is shown."""
 
     def show(self, status: LiveStatus) -> None:
         """Print when the next second has begun."""
@@ -117,6 +160,9 @@ class TerminalView:
         traceback: TracebackType | None,
     ) -> None:
         self._live.__exit__(kind, error, traceback)
+
+    def begin(self, setup: RunSetup) -> None:
+        """Nothing of it is shown."""
 
     def show(self, status: LiveStatus) -> None:
         """Redraw when a tenth of a second of wall time has passed."""

@@ -22,6 +22,7 @@ from rig.rest import wait_for_rest
 from rig.run_data import RunData
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
+from rig.showing import Showing
 from rig.supervisor import RigState, Supervisor, Verdict
 from rig.vision import Vision
 from rig.watch import Watch
@@ -58,7 +59,6 @@ class RunLoop:
         self._data = data
         self._log = log
         self._stop_requested = stop_requested
-        self._on_tick = on_tick
         self._commander = Commander(arm, limiter, data, log, config.arm.hold_s, deadman)
         self._period_s = 1.0 / config.run.control_rate_hz
         self._tool_from_camera = twist_map(data.T_tool_camera)
@@ -66,6 +66,7 @@ class RunLoop:
         self._supervisor = Supervisor(config.safety)
         self._convergence = make_convergence(config, data)
         self._stats = TickStats()
+        self._showing = Showing(on_tick, fusion, data, self._stats, self._convergence)
         self._started_s = 0.0
         self._last_s = 0.0  # the tick before this one
         self._first_feature_s: float | None = None
@@ -79,7 +80,7 @@ class RunLoop:
         Failures of devices and safety stops are returned in the outcome; anything else is
         raised. In every case the arm has been told to stop.
         """
-        self._started_s = self._clock.now_s()
+        self._started_s = self._showing.started_s = self._clock.now_s()
         self._log.event(self._started_s, "started")
         self._supervisor.start(self._started_s)
         self._watch.start(self._started_s)
@@ -220,21 +221,8 @@ class RunLoop:
         allowed = self._commander.send(now_s, wanted, state, estimate, dt_s)
         if verdict.state is RigState.RUNNING:
             self._envelope = allowed.blocked
-        self._on_tick(
-            LiveStatus(
-                elapsed_s=now_s - self._started_s,
-                state=f"{verdict.state}: {verdict.detail}" if verdict.detail else verdict.state,
-                estimate=estimate,
-                target_state=self._target_state,
-                frames=self._data.frames,
-                frames_lost=self._data.frames_lost,
-                ticks=self._stats.ticks,
-                overruns=self._stats.overruns,
-                speed_m_s=self._fusion.camera_speed_m_s(),
-                limited_by=allowed.reasons,
-                remaining_fraction=self._convergence.remaining_fraction,
-            )
-        )
+        text = f"{verdict.state}: {verdict.detail}" if verdict.detail else verdict.state
+        self._showing.show(now_s, text, self._target_state, estimate, allowed.reasons)
 
     def _ramp_to_rest(self) -> None:
         """Bring the command to zero within the acceleration limits, still watching the arm."""
@@ -247,6 +235,7 @@ class RunLoop:
             dt_s = min(now_s - last_s, _LONGEST_STEP_TICKS * self._period_s) or self._period_s
             allowed = self._commander.send(now_s, np.zeros(6), state, None, dt_s)
             last_s = now_s
+            self._showing.show(now_s, self._supervisor.state, self._target_state, None)
             if not np.any(allowed.twist_tool):
                 return
 
@@ -254,3 +243,4 @@ class RunLoop:
         now_s = self._clock.now_s()
         self._supervisor.enter(state, now_s, detail)
         self._log.event(now_s, f"state {state}", detail)
+        self._showing.show(now_s, f"{state}: {detail}", self._target_state, None)

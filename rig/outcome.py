@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from drivers.errors import RigError
+from drivers.interfaces import ArmState
 from estimator.estimate import Estimate
 from rig.run_data import RunData
 from rig.schedule import TickStats
+from rig.vision import Sighting
 
 
 class Ending(Enum):
@@ -35,6 +37,9 @@ class LiveStatus:
     speed_m_s: float  # measured, of the camera
     limited_by: tuple[str, ...]
     remaining_fraction: float  # predicted rest of the observer's transient
+    late_s: float  # by which the newest tick began after its point on the grid
+    arm: ArmState | None  # its newest sample
+    sighting: Sighting | None  # the newest image and what was measured in it
 
 
 @dataclass(frozen=True, slots=True)

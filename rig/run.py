@@ -1,7 +1,7 @@
 """One run from configuration to summary: build, loop, analyse, write."""
 
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,6 +81,7 @@ def execute(
         wall: Clock = WallClock()
         wall_start_s = wall.now_s()
         with _conditions(rig, config) as (scheduling, deadman), _shown(view, rig) as shown:
+            shown.begin(setup)
             loop = RunLoop(
                 clock=rig.clock,
                 arm=rig.arm,

@@ -27,6 +27,17 @@ Assignments = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Override one configuration key; repeatable."),
 ]
 Seed = Annotated[int | None, typer.Option(help="Seed of the simulated rig (sim.seed).")]
+ViewPort = Annotated[
+    int | None,
+    typer.Option(min=1, max=65535, help="The page's port; default: 8080, or a free one."),
+]
+ViewHost = Annotated[
+    str | None,
+    typer.Option(help="Serve the page at another address than 127.0.0.1; needs --view-token."),
+]
+ViewToken = Annotated[
+    str | None, typer.Option(help="What whoever opens the page has to know: letters and digits.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="JSON on stdout, everything else on stderr.")]
 
 

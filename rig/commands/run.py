@@ -13,6 +13,9 @@ from rig.commands.options import (
     RigFile,
     Seed,
     Target,
+    ViewHost,
+    ViewPort,
+    ViewToken,
     exit_code_of_run,
     view_for,
     warn,
@@ -57,6 +60,13 @@ def run(
         ),
     ] = False,
     as_json: AsJson = False,
+    view: Annotated[
+        bool,
+        typer.Option("--view", help="Serve a live page with a STOP button (extra `view`)."),
+    ] = False,
+    view_port: ViewPort = None,
+    view_host: ViewHost = None,
+    view_token: ViewToken = None,
     report: Annotated[
         bool, typer.Option(help="Write report.html and report.png at the end.")
     ] = True,
@@ -66,8 +76,11 @@ def run(
     ] = None,
 ) -> None:
     """Move the camera, estimate the target's radius and pose, write a run directory."""
+    from drivers.errors import ConfigError
     from rig.calibrated import calibrated, calibration_path
     from rig.config_load import load_config
+    from rig.page.address import page_address
+    from rig.page.watching import watching
     from rig.recorded import read_run
     from rig.records import make_run_dir, write_summary
     from rig.report import write_reports
@@ -82,22 +95,27 @@ def run(
     extra += [] if until is None else [f"run.until_share={_share(until)!r}"]
     config, source = calibrated(load_config(target, rig, extra), uncalibrated)
     warn(f"calibration: {source}")
+    address = page_address(view_host, view_port, view_token) if view else None
     run_dir = make_run_dir(out, target)
     console = Console(stderr=as_json)
-    with StopRequest() as stop_requested:
-        result = execute(
-            *(config, target, run_dir, realtime, view_for(console), stop_requested, source),
-            attachments=tuple(path for path in [calibration_path(config)] if str(path) == source),
-        )
-    if as_json:
-        print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
-    console.print(table(result.summary))
-    try:
-        write_summary(run_dir, result.summary)
-        if report:
-            write_reports([read_run(run_dir)], run_dir)
-    except OSError as error:  # what was measured stands all the same
-        warn(f"warning: {run_dir} is not complete: {error}")
+    with watching(address, config.safety) as page:
+        if page.url is not None:
+            warn(f"live page: {page.url}")
+        with StopRequest() as stop_requested:
+            shown, stopped = page.beside(view_for(console)), page.or_else(stop_requested)
+            result = execute(
+                *(config, target, run_dir, realtime, shown, stopped, source),
+                attachments=tuple(p for p in [calibration_path(config)] if str(p) == source),
+            )
+        if as_json:
+            print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
+        console.print(table(result.summary))
+        try:
+            write_summary(run_dir, result.summary)
+            if report:
+                write_reports([read_run(run_dir)], run_dir)
+        except (OSError, ConfigError) as error:  # what was measured stands all the same
+            warn(f"warning: {run_dir} is not complete: {error}")
     _explain(result)
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:

@@ -32,8 +32,14 @@ class RunSetup:
 
 def write_setup(run_dir: Path, setup: RunSetup) -> None:
     """Write ``setup.json``."""
+    text = json.dumps(setup_values(setup), indent=2, allow_nan=False)
+    (run_dir / SETUP_NAME).write_text(text + "\n", encoding="utf-8")
+
+
+def setup_values(setup: RunSetup) -> dict[str, Any]:
+    """What JSON takes of it."""
     lens = setup.intrinsics
-    values = {
+    return {
         "target": setup.target,
         "started_at": setup.started_at,
         "calibration": setup.calibration,
@@ -48,8 +54,6 @@ def write_setup(run_dir: Path, setup: RunSetup) -> None:
         "radius_true_m": setup.radius_true_m,
         "renderer": setup.renderer,
     }
-    text = json.dumps(values, indent=2, allow_nan=False)
-    (run_dir / SETUP_NAME).write_text(text + "\n", encoding="utf-8")
 
 
 def read_setup(run_dir: Path) -> RunSetup:
@@ -57,14 +61,15 @@ def read_setup(run_dir: Path) -> RunSetup:
     path = run_dir / SETUP_NAME
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
-        return _setup_of(values)
+        return setup_of(values)
     except FileNotFoundError as error:
         raise ConfigError(f"{run_dir} holds no run: {SETUP_NAME} is missing") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"{path} cannot be read: {error!r}") from error
 
 
-def _setup_of(values: dict[str, Any]) -> RunSetup:
+def setup_of(values: dict[str, Any]) -> RunSetup:
+    """The setup that ``setup_values`` described; raises KeyError, TypeError or ValueError."""
     lens = values["intrinsics"]
     return RunSetup(
         target=values["target"],

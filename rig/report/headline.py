@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.recorded import RunRecord
 from rig.records import Json
+from rig.spread import left_m, stated_m
 
 _SCATTER_OVER_S = 1.0
 
@@ -32,8 +33,7 @@ def error_bar(record: RunRecord) -> ErrorBar | None:
         return None
     stated = number(summary, "radius_std_m")
     last = record.data.updates[-1]
-    if stated is None and last.variance is not None and last.radius_m is not None:
-        stated = float(np.sqrt(last.variance)) * last.radius_m**2  # dR = R² dχ
+    stated = stated_m(last) if stated is None else stated
     if stated is not None:
         return ErrorBar(stated, STATED)
     return ErrorBar(_judged_m(record, number(summary, "transient_left") or 0.0), JUDGED)
@@ -46,14 +46,11 @@ def number(summary: Mapping[str, Json], key: str) -> float | None:
 
 
 def _judged_m(record: RunRecord, left: float) -> float:
-    """The transient has ``left`` of its start: R̂ has come 1 − left of its way from the guess."""
+    """The scatter of the last second, and the rest of the transient."""
     updates = record.data.update_track()
     with np.errstate(divide="ignore"):
         radius_m = 1.0 / updates.chi
     late = updates.t_s >= updates.t_s[-1] - _SCATTER_OVER_S
     scatter_m = float(np.std(radius_m[late]))
-    # A run hardly begun: all that is known is that the guess may be off by itself.
-    left = min(left, 0.5)
     chi = updates.chi
-    way = abs(float(chi[-1] - chi[0])) * left / (1.0 - left)
-    return float(np.hypot(scatter_m, way * radius_m[-1] ** 2))
+    return float(np.hypot(scatter_m, left_m(float(chi[-1]), float(chi[0]), left)))

@@ -8,6 +8,7 @@ import pytest
 
 from rig.background_view import BackgroundView
 from rig.outcome import LiveStatus
+from rig.recorded import RunSetup
 
 PATIENCE_S = 10.0
 
@@ -30,6 +31,9 @@ class Screen:
         if self.broken:
             raise BrokenPipeError(32, "Broken pipe")
         self.shown.append(status)
+
+    def begin(self, setup: RunSetup) -> None:
+        self.setup = setup
 
     def __enter__(self) -> Self:
         self.entered = True
