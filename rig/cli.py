@@ -17,6 +17,7 @@ from rig.commands.report import report, runs
 from rig.commands.reproduce import reproduce
 from rig.commands.run import run
 from rig.commands.sim import sim_app
+from rig.commands.view import view
 from rig.exit_codes import HELP, ExitCode, exit_code_of
 from rig.output import patient_output
 
@@ -35,6 +36,7 @@ app.command()(replay)
 app.command(epilog=HELP)(reproduce)
 app.command()(report)
 app.command()(runs)
+app.command()(view)
 app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")

@@ -10,7 +10,6 @@ import socket
 import sys
 
 import cv2
-import numpy as np
 
 from drivers.clock import Clock, WallClock
 from rig.outlined import outlined
@@ -102,7 +101,7 @@ class Child:
         self._image = state.image
         drawn = outlined(image, state.feature, self._about.setup.intrinsics)
         caption = state.image_reason or "the fitted outline in red"
-        self._panel.show_image(np.asarray(cv2.cvtColor(drawn, cv2.COLOR_BGR2RGB)), caption)
+        self._panel.show_image(drawn, caption)
 
 
 def serve(parent: socket.socket, board: Board) -> None:

@@ -49,8 +49,8 @@ class History:
         self._before, self._latest_ms = state, 0.0
 
     def radius(self) -> tuple[FloatArray, ...]:
-        """t [s]; R̂, R̂ − σ, R̂ + σ [mm]; each (n,)."""
-        return self._columns(0, 1, 2, 3)
+        """t [s]; R̂ − σ, R̂ + σ, R̂ [mm], in the order they are drawn over each other; each (n,)."""
+        return self._columns(0, 2, 3, 1)
 
     def health(self) -> tuple[FloatArray, ...]:
         """t [s], greatest lateness [ms], ticks missed; each (n,)."""

@@ -1,8 +1,10 @@
 """The page's panel: STOP, the numbers, the camera's image, two plots."""
 
+import base64
 import html
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -16,8 +18,13 @@ ColourImage = NDArray[np.uint8]  # (height, width, 3)
 _WIDTH_PX = 470.0
 _PLOT_EVERY_S = 0.25
 _JPEG_QUALITY = 80
-_CAPTION = "padding:0 .8em;font-size:.8em"
+_IMAGE = "padding:0 .8em;font-size:.8em;text-align:center"
 _WHAT_STOP_DOES = "Ramp the arm to rest and end the run, as Ctrl-C does"
+# The icon tells this button from viser's own.
+_LARGE_STOP = (
+    "<style>button:has(.icon-tabler-hand-stop)"
+    "{height:4.5rem;font-size:1.6rem;letter-spacing:.04em}</style>"
+)
 _STATE_COLOURS = {
     "running": "#2e8b57",
     "holding": "#c77700",
@@ -42,10 +49,7 @@ class Panel:
         if on_stop is not None:
             self._add_stop()
         self._numbers = gui.add_html("")
-        self._image = gui.add_image(
-            np.full((480, 640, 3), 40, np.uint8), format="jpeg", jpeg_quality=_JPEG_QUALITY
-        )
-        self._caption = gui.add_html("")
+        self._image = gui.add_html("")
         self._add_plots()
 
     def update(self, state: PageState) -> None:
@@ -58,10 +62,8 @@ class Panel:
             self._health_plot.data = self._history.health()
 
     def show_image(self, image: ColourImage, caption: str) -> None:
-        """Show an RGB image."""
-        self._image.image = image
-        text = html.escape(caption)
-        self._caption.content = f'<div id="rig-caption" style="{_CAPTION}">{text}</div>'
+        """Show a BGR image."""
+        self._image.content = image_html(image, caption)
 
     def end(self, text: str) -> None:
         """The run is over: nothing can be stopped any more."""
@@ -69,6 +71,7 @@ class Panel:
             self._stop.label, self._stop.disabled = text, True
 
     def _add_stop(self) -> None:
+        self._gui.add_html(_LARGE_STOP)
         self._stop = self._gui.add_button(
             "STOP   (space bar)",
             color="red",
@@ -92,9 +95,9 @@ class Panel:
             self._history.radius(),
             (
                 uplot.Series(label="t [s]"),
-                series("R̂ [mm]", _BLUE),
                 series("− σ", _PALE),
                 series("+ σ", _PALE),
+                series("R̂ [mm]", _BLUE),
             ),
             scales={"x": uplot.Scale(time=False)},
             height=190,
@@ -111,6 +114,24 @@ class Panel:
             height=170,
             title="control loop",
         )
+
+
+def image_html(image: ColourImage, caption: str) -> str:
+    """An image with its caption; the pixels are in the text itself.
+
+    Viser's own images are fetched by the browser under names that the next image makes invalid,
+    which a slow one answers with errors and gaps.
+    """
+    ok, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    assert ok  # an image of this type always encodes
+    data = base64.b64encode(jpeg.tobytes()).decode("ascii")
+    height, width = image.shape[:2]
+    return (
+        f'<div style="{_IMAGE}"><img id="rig-image" alt="camera" decoding="sync" '
+        f'style="height:260px;aspect-ratio:{width}/{height};max-width:100%" '
+        f'src="data:image/jpeg;base64,{data}">'
+        f'<div id="rig-caption">{html.escape(caption)}</div></div>'
+    )
 
 
 def numbers_html(state: PageState, rate_hz: float | None) -> str:

@@ -61,7 +61,10 @@ class Scene:
     def _rig(self, setup: RunSetup, safety: SafetyConfig) -> None:
         scene = self._scene
         scene.set_up_direction("+z")
+        # Neither shadows nor reflections: many a machine draws this by software.
         scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light", intensity=1.2)
         height_m = 0.0 if safety.table is None else safety.table.offset_m
         scene.add_grid("/floor", 2.0, 2.0, cell_size=0.1, position=(0.0, 0.0, height_m))
         scene.add_frame("/base", axes_length=0.1, axes_radius=0.003)

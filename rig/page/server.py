@@ -1,8 +1,10 @@
 """The web server of the page: viser on an address nobody was told, and the gate before it."""
 
 import asyncio
+import io
 import random
 import threading
+from contextlib import AbstractContextManager, redirect_stdout
 
 import viser
 
@@ -24,7 +26,8 @@ class PageServer:
     def __init__(self, address: PageAddress) -> None:
         # The whole of 127/8 is this machine's: an address that cannot be guessed, at a free port.
         host = f"127.{'.'.join(str(random.SystemRandom().randrange(1, 255)) for _ in range(3))}"
-        self.viser = PrivateServer(host=host, port=0, verbose=False)
+        with _silence():
+            self.viser = PrivateServer(host=host, port=0, verbose=False)
         self._address = address
         self._gate = Gate((host, self.viser.get_port()), address.token)
         self._loop = asyncio.new_event_loop()
@@ -43,7 +46,8 @@ class PageServer:
     def stop(self) -> None:
         """Send what is on its way and end."""
         self.viser.flush()
-        self.viser.stop()
+        with _silence():
+            self.viser.stop()
         self._loop.call_soon_threadsafe(self._loop.stop)
 
     def _listen(self) -> int:
@@ -60,3 +64,8 @@ class PageServer:
         server = asyncio.run_coroutine_threadsafe(serving, self._loop).result()
         bound: int = server.sockets[0].getsockname()[1]
         return bound
+
+
+def _silence() -> AbstractContextManager[object]:
+    """Viser announces an address that is not for the user."""
+    return redirect_stdout(io.StringIO())
