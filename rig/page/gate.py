@@ -71,17 +71,21 @@ class Gate:
     ) -> None:
         inner_reader, inner_writer = await asyncio.open_connection(*self._inside)
         inner_writer.write(_one_request(head))
-        await asyncio.gather(_copy(reader, inner_writer), _copy(inner_reader, writer))
+        asking = asyncio.create_task(_copy(reader, inner_writer))
+        try:
+            await _copy(inner_reader, writer)
+        finally:
+            asking.cancel()
+            inner_writer.close()
 
 
 async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Until either end hangs up; then both do."""
-    try:
+    """Until there is no more, which is passed on as well."""
+    with contextlib.suppress(OSError):
         while chunk := await reader.read(_CHUNK_BYTES):
             writer.write(chunk)
             await writer.drain()
-    finally:
-        writer.close()
+        writer.write_eof()
 
 
 def _parsed(head: bytes) -> tuple[str, dict[str, str]]:
