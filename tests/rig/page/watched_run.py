@@ -30,12 +30,14 @@ class WatchedRun:
         return self.process.returncode, json.loads(output)
 
     def first_reduced_s(self) -> float:
-        """When the first command below the cruising speed was sent."""
+        """When the first command of the ramp was sent, which is slower than the one before."""
         entries = [json.loads(line) for line in (self.out / "log.jsonl").read_text().splitlines()]
-        commands = [entry for entry in entries if entry["kind"] == "command"]
-        speeds = np.array([np.linalg.norm(entry["allowed"][:3]) for entry in commands])
-        full = int(np.flatnonzero(speeds > 0.9 * speeds.max())[-1])
-        return commands[full + 1]["t_s"]
+        ramp = next(n for n, entry in enumerate(entries) if entry.get("event") == "state stopping")
+        before = [entry for entry in entries[:ramp] if entry["kind"] == "command"][-1]
+        first = next(entry for entry in entries[ramp:] if entry["kind"] == "command")
+        slower, speed = (np.linalg.norm(entry["allowed"][:3]) for entry in (first, before))
+        assert slower < 0.99 * speed
+        return first["t_s"]
 
 
 @contextmanager
