@@ -7,9 +7,10 @@ from pathlib import Path
 from rich.table import Table
 
 from drivers.errors import ConfigError
+from rig.log.run_log import LOG_NAME
 from rig.recorded.read import read_summary
 from rig.recorded.setup import SETUP_NAME, RunSetup, read_setup
-from rig.records import LOG_NAME, SUMMARY_NAME, Json
+from rig.records import SUMMARY_NAME, Json
 from rig.report.headline import number
 from rig.report.texts import date_text, figure
 

@@ -1,15 +1,4 @@
-"""How far off a radius may be: as the estimator states it, or judged from its transient."""
-
-import numpy as np
-
-from estimator.estimate import Estimate
-
-
-def stated_m(estimate: Estimate) -> float | None:
-    """One standard deviation of the radius, from that of χ; None where none is stated."""
-    if estimate.variance is None or estimate.radius_m is None:
-        return None
-    return float(np.sqrt(estimate.variance)) * estimate.radius_m**2  # dR = R² dχ
+"""How far off the radius of an estimator may be that does not say so itself."""
 
 
 def left_m(chi: float, first_chi: float, left: float) -> float:

@@ -12,7 +12,6 @@ from rig.page.panel import Panel
 from rig.page.scene import Scene
 from rig.page.state import PageState, with_arm, with_estimate, with_feature
 from rig.recorded import RunRecord
-from rig.report.timing import tick_lateness_s
 
 FloatArray = NDArray[np.float64]
 
@@ -28,11 +27,11 @@ class RecordedStates:
         data = record.data
         self._arm_s = [state.t_s for state in data.arm_states]
         self._update_s = [update.t_s for update in data.updates]
-        self._tick_s = [command.t_s for command in record.commands]
+        self._tick_s = [tick.t_s for tick in record.ticks]
+        self._command_s = [command.t_s for command in record.commands]
         self._frame_s = [frame.handled_s for frame in record.frames]
         self._lost = np.cumsum([frame.reason != "" for frame in record.frames])
         self._picture_s = [picture.t_s for picture in record.pictures]
-        self._late_s = tick_lateness_s(record)
         self._speed_m_s = np.linalg.norm(data.arm_track().twist_camera[:, :3], axis=1)
         starts = [times[0] for times in (self._arm_s, self._tick_s) if times]
         event_s = [event.t_s for event in record.events]
@@ -45,6 +44,7 @@ class RecordedStates:
         t_s = self._start_s + elapsed_s
         record, data = self._record, self._record.data
         frame, tick = bisect_right(self._frame_s, t_s), bisect_right(self._tick_s, t_s)
+        command = bisect_right(self._command_s, t_s)
         arm, update = bisect_right(self._arm_s, t_s), bisect_right(self._update_s, t_s)
         before = [event for event in record.events if event.t_s <= t_s]
         states = [event for event in before if event.name.startswith("state ")]
@@ -56,10 +56,10 @@ class RecordedStates:
             frames=frame,
             frames_lost=int(self._lost[frame - 1]) if frame else 0,
             ticks=tick,
-            overruns=sum(event.name == "overrun" for event in before),
-            late_s=float(self._late_s[tick - 1]) if tick else 0.0,
+            overruns=record.ticks[tick - 1].overruns if tick else 0,
+            late_s=record.ticks[tick - 1].late_s if tick else 0.0,
             speed_m_s=float(self._speed_m_s[arm - 1]) if arm else 0.0,
-            limited_by=record.commands[tick - 1].reasons if tick else (),
+            limited_by=record.commands[command - 1].reasons if command else (),
         )
         picture = self.picture_at(elapsed_s)
         if picture is not None:
@@ -125,7 +125,7 @@ class Player:
         record = self._record
         picture = record.pictures[number]
         image = outlined(picture.load(), picture.feature, record.setup.intrinsics)
-        caption = f"image {number + 1} of {len(record.pictures)} kept"
+        caption = f"image {number + 1} of {len(record.pictures)}"
         self._panel.show_image(image, f"{caption}, t = {picture.t_s - record.start_s:.2f} s")
 
 

@@ -10,7 +10,7 @@ from drivers.interfaces import ArmState
 from estimator.estimate import Estimate
 from estimator.image.feature import Feature
 from rig.outcome import LiveStatus
-from rig.spread import left_m, stated_m
+from rig.spread import left_m
 from rig.vision.sighting import Sighting
 
 FloatArray = NDArray[np.float64]
@@ -111,7 +111,7 @@ def with_estimate(
     radius_m = None if estimate is None else estimate.radius_m
     if estimate is None or radius_m is None or not np.isfinite(radius_m):
         return state
-    stated = stated_m(estimate)
+    stated = estimate.radius_std_m
     judged = None if first_chi is None else left_m(estimate.chi, first_chi, left)
     return replace(
         state,

@@ -4,12 +4,11 @@
 """
 
 from rig.recorded.read import read_run
-from rig.recorded.record import Command, Event, FrameEntry, RunRecord
+from rig.recorded.record import Command, FrameEntry, RunRecord
 from rig.recorded.setup import RunSetup, read_setup, write_setup
 
 __all__ = [
     "Command",
-    "Event",
     "FrameEntry",
     "RunRecord",
     "RunSetup",

@@ -1,76 +1,52 @@
-"""The few images of a run that its report shows, as PNG files in the run directory."""
+"""The images of a log, each decoded when somebody asks for it."""
 
-import json
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import cv2
-import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
 
 from drivers.errors import ConfigError
 from drivers.interfaces import GreyImage
-from estimator.image.feature import Feature
-from rig.recorded.record import Picture
-from rig.run_data import RunData
+from rig.log.pixels import image_of
+from rig.log.reader import Log, Record
+from rig.log.topics import BY_KIND
 
-_FOLDER = "images"
-_INDEX = "index.json"
-# Noise does not compress: higher levels take longer and gain next to nothing.
-_PNG_LEVEL = 1
+IMAGE_KINDS = ("image", "raw_image")
 
 
-def write_pictures(run_dir: Path, data: RunData) -> None:
-    """Write the snapshots that the run kept, with what was measured in each."""
-    snapshots = list(data.snapshots)
-    newest = data.newest_snapshot
-    if newest is not None and all(kept is not newest for kept in snapshots):
-        snapshots.append(newest)
-    if not snapshots:
-        return
-    folder = run_dir / _FOLDER
-    folder.mkdir(exist_ok=True)
-    entries = []
-    for number, snapshot in enumerate(snapshots):
-        name, feature = f"{number}.png", snapshot.feature
-        ok, png = cv2.imencode(".png", snapshot.image, [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])
-        assert ok  # a grey image always encodes
-        (folder / name).write_bytes(png.tobytes())
-        entries.append(
-            {
-                "file": name,
-                "t_s": snapshot.t_s,
-                "s": feature.s.tolist(),
-                "covariance": feature.covariance.tolist(),
-                "axis": None if feature.axis is None else feature.axis.tolist(),
-            }
-        )
-    (folder / _INDEX).write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+def loader(log: Log, record: Record) -> Callable[[], GreyImage]:
+    """What decodes the image of ``record``; it raises ConfigError when that is not possible.
+
+    A log that was closed in order has an index to find it by; another one is searched.
+    """
+    find = _indexed if log.finished else _searched
+    return partial(find, log, record.kind, record.logged_ns, record.t_ns)
 
 
-def read_pictures(run_dir: Path) -> tuple[Picture, ...]:
-    """The images written, none of a run that was cut off; raises ConfigError for a bad index."""
-    path = run_dir / _FOLDER / _INDEX
-    if not path.exists():
-        return ()
+def _indexed(log: Log, kind: str, logged_ns: int, t_ns: int) -> GreyImage:
+    topic = BY_KIND[kind]
+    assert topic.message is not None  # images are protobuf
     try:
-        return tuple(
-            Picture(
-                t_s=float(entry["t_s"]),
-                feature=Feature(
-                    np.array(entry["s"], dtype=float),
-                    np.array(entry["covariance"], dtype=float),
-                    None if entry["axis"] is None else np.array(entry["axis"], dtype=float),
-                ),
-                load=partial(_load, path.parent / entry["file"]),
+        with log.path.open("rb") as file:
+            found = make_reader(file).iter_messages(
+                [topic.name], start_time=logged_ns, end_time=logged_ns + 1
             )
-            for entry in json.loads(path.read_text(encoding="utf-8"))
-        )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(f"{path} cannot be read: {error!r}") from error
+            for _, _, message in found:
+                if message.publish_time == t_ns:
+                    return image_of(topic.message.FromString(message.data))
+    except (OSError, McapError) as error:
+        raise ConfigError(f"{log.path} cannot be read: {error}") from error
+    raise ConfigError(_missing(log.path))
 
 
-def _load(path: Path) -> GreyImage:
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        raise ConfigError(f"{path} is not an image that can be read")
-    return np.asarray(image, dtype=np.uint8)
+def _searched(log: Log, kind: str, logged_ns: int, t_ns: int) -> GreyImage:
+    for record in log.records([kind]):
+        if (record.logged_ns, record.t_ns) == (logged_ns, t_ns):
+            return record.image()
+    raise ConfigError(_missing(log.path))
+
+
+def _missing(path: Path) -> str:
+    return f"{path} no longer holds an image that it held before: was it replaced meanwhile?"

@@ -1,22 +1,17 @@
-"""Reads a run directory; the only module that knows the format of its log."""
+"""Reads a run directory back, as far as the run came."""
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from drivers.errors import ConfigError
-from drivers.interfaces import ArmState
-from estimator.estimate import Estimate
-from rig.config_load import load_config
-from rig.recorded.pictures import read_pictures
-from rig.recorded.record import Command, Event, FrameEntry, RunRecord
+from rig.log.reader import Log
+from rig.recorded.pictures import IMAGE_KINDS, loader
+from rig.recorded.record import Command, FrameEntry, Picture, RunRecord
 from rig.recorded.setup import read_setup
-from rig.records import LOG_NAME, SUMMARY_NAME, Json
+from rig.records import SUMMARY_NAME, Json
+from rig.replay.recording import Estimated, Event, Seen, States, Tick, open_recording
 from rig.run_data import RunData
-
-Entry = dict[str, Any]
 
 
 def read_run(run_dir: Path) -> RunRecord:
@@ -25,38 +20,36 @@ def read_run(run_dir: Path) -> RunRecord:
     Raises ConfigError for a directory that holds no run, or one that this version cannot read.
     """
     setup = read_setup(run_dir)
-    config = load_config(setup.target, run_dir / "config.yaml")
+    recording = open_recording(run_dir)
     data = RunData(setup.target, setup.T_tool_camera)
-    frames: list[FrameEntry] = []
-    commands: list[Command] = []
+    seen: list[Seen] = []
+    ticks: list[Tick] = []
     events: list[Event] = []
-    path = run_dir / LOG_NAME
-    try:
-        for entry in _entries(path):
-            kind = entry["kind"]
-            if kind == "arm":
-                data.arm_states.append(_arm_state(entry))
-            elif kind == "update":
-                data.updates.append(_estimate(entry))
-            elif kind == "frame":
-                frames.append(_frame(entry))
-                data.add_frame(entry["seq"], entry["s"] is not None)
-            elif kind == "command":
-                commands.append(_command(entry))
-            elif kind == "event":
-                events.append(Event(entry["t_s"], entry["event"], entry["detail"]))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(f"{path} cannot be read: {error!r}") from error
+    for step in recording.steps(images=False):
+        if isinstance(step, States):
+            data.arm_states.extend(step.states)
+        elif isinstance(step, Seen):
+            seen.append(step)
+            data.add_frame(step.sighting.frame.seq, step.sighting.measurement.found)
+        elif isinstance(step, Tick):
+            ticks.append(step)
+        elif isinstance(step, Event):
+            events.append(step)
+        elif isinstance(step, Estimated) and step.kind == "update":
+            data.updates.append(step.estimate)
+    config = recording.config()
+    commands, pictures = _rest(recording.log, seen, config.calibration.latency_s)
     return RunRecord(
         directory=run_dir,
         setup=setup,
         config=config,
         summary=read_summary(run_dir),
         data=data,
-        frames=tuple(frames),
-        commands=tuple(commands),
+        frames=tuple(_frame(one) for one in seen),
+        ticks=tuple(ticks),
+        commands=commands,
         events=tuple(events),
-        pictures=read_pictures(run_dir),
+        pictures=pictures,
     )
 
 
@@ -69,50 +62,36 @@ def read_summary(run_dir: Path) -> dict[str, Json] | None:
     return summary if isinstance(summary, dict) else None
 
 
-def _entries(path: Path) -> list[Entry]:
-    """The log's lines; a last one that a killed run left unfinished is dropped."""
-    lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
-    entries = []
-    for number, line in enumerate(lines):
-        if not line:
-            continue
-        try:
-            entries.append(json.loads(line))
-        except ValueError:
-            if number == len(lines) - 1:
-                break
-            raise
-    return entries
+def _rest(
+    log: Log, seen: list[Seen], stamps_late_s: float
+) -> tuple[tuple[Command, ...], tuple[Picture, ...]]:
+    """What a replay does not need: the commands, and where the images are."""
+    commands: list[Command] = []
+    pictures: list[Picture] = []
+    frames = 0
+    for record in log.records(["frame", "command", *IMAGE_KINDS]):
+        if record.kind == "frame":
+            frames += 1
+        elif record.kind == "command":
+            values = record.values()
+            commands.append(
+                Command(
+                    t_s=values["t_s"],
+                    commanded=np.array(values["commanded"]),
+                    allowed=np.array(values["allowed"]),
+                    measured=np.array(values["measured"]),
+                    reasons=tuple(values["reasons"]),
+                )
+            )
+        elif 0 < frames <= len(seen):  # an image follows what was measured in it
+            sighting = seen[frames - 1].sighting
+            t_s = sighting.frame.t_exposure_mid_s - stamps_late_s
+            feature = sighting.measurement.feature
+            pictures.append(Picture(t_s, feature, loader(log, record)))
+    return tuple(commands), tuple(pictures)
 
 
-def _arm_state(entry: Entry) -> ArmState:
-    T = np.eye(4)
-    T[:3] = entry["T_base_tool"]
-    return ArmState(entry["t_s"], T, np.array(entry["twist_tool"]))
-
-
-def _estimate(entry: Entry) -> Estimate:
-    axis = entry["axis"]
-    return Estimate(
-        t_s=entry["t_s"],
-        s=np.array(entry["s"]),
-        axis=None if axis is None else np.array(axis),
-        chi=entry["chi"],
-        variance=entry.get("variance"),
-        residual=entry["residual"],
-        extrapolated_s=entry["extrapolated_s"],
-    )
-
-
-def _frame(entry: Entry) -> FrameEntry:
-    return FrameEntry(entry["t_s"], entry["handled_s"], entry["seq"], entry["reason"])
-
-
-def _command(entry: Entry) -> Command:
-    return Command(
-        t_s=entry["t_s"],
-        commanded=np.array(entry["commanded"]),
-        allowed=np.array(entry["allowed"]),
-        measured=np.array(entry["measured"]),
-        reasons=tuple(entry["reasons"]),
-    )
+def _frame(seen: Seen) -> FrameEntry:
+    frame = seen.sighting.frame
+    reason = seen.sighting.measurement.reason
+    return FrameEntry(frame.t_exposure_mid_s, seen.handled_s, frame.seq, reason)

@@ -12,18 +12,10 @@ from estimator.image.feature import Feature
 from rig.config import RigConfig
 from rig.recorded.setup import RunSetup
 from rig.records import Json
+from rig.replay.recording import Event, Tick
 from rig.run_data import RunData
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened."""
-
-    t_s: float
-    name: str
-    detail: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +41,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One kept image; it is decoded only when somebody asks for it."""
+    """One recorded image; it is decoded only when somebody asks for it."""
 
     t_s: float  # of its exposure
     feature: Feature | None
@@ -66,9 +58,10 @@ class RunRecord:
     summary: Mapping[str, Json] | None  # None: the run was cut off
     data: RunData  # arm states and updates; no snapshots
     frames: tuple[FrameEntry, ...]
+    ticks: tuple[Tick, ...]
     commands: tuple[Command, ...]
     events: tuple[Event, ...]
-    pictures: tuple[Picture, ...]  # by time
+    pictures: tuple[Picture, ...]  # by time; none where images were not recorded
 
     @property
     def start_s(self) -> float:

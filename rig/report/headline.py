@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.recorded import RunRecord
 from rig.records import Json
-from rig.spread import left_m, stated_m
+from rig.spread import left_m
 
 _SCATTER_OVER_S = 1.0
 
@@ -33,7 +33,7 @@ def error_bar(record: RunRecord) -> ErrorBar | None:
         return None
     stated = number(summary, "radius_std_m")
     last = record.data.updates[-1]
-    stated = stated_m(last) if stated is None else stated
+    stated = last.radius_std_m if stated is None else stated
     if stated is not None:
         return ErrorBar(stated, STATED)
     return ErrorBar(_judged_m(record, number(summary, "transient_left") or 0.0), JUDGED)

@@ -104,7 +104,7 @@ def draw_image(axes: Axes, picture: Picture | None, intrinsics: Intrinsics, star
     """An image with the fitted outline."""
     axes.set_axis_off()
     if picture is None:
-        axes.set_title("no image was kept")
+        axes.set_title("no image with an outline was recorded")
         return
     image = picture.load()
     axes.imshow(image, cmap="gray", vmin=0, vmax=255)

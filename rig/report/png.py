@@ -46,7 +46,8 @@ def write_png(path: Path, runs: Sequence[Shown]) -> None:
     last = figure.add_subplot(grid[1, 2])
     if len(runs) == 1:
         record = runs[0].record
-        picture = record.pictures[-1] if record.pictures else None
+        found = [picture for picture in record.pictures if picture.feature is not None]
+        picture = found[-1] if found else None
         draw_image(last, picture, record.setup.intrinsics, record.start_s)
     else:
         _draw_all(last, draw_deviation, runs)

@@ -8,6 +8,7 @@ from rig.report.shown import Shown
 from rig.report.stills import stills
 from rig.report.texts import date_text, escape, figure, json_text
 
+_NO_IMAGES = "<p>none was recorded</p>"
 _CUT_OFF = "the run was cut off: there is no summary"
 
 
@@ -27,7 +28,9 @@ def images(runs: Sequence[Shown]) -> str:
             f"<figcaption>t = {still.t_s:.2f} s</figcaption></figure>"
             for still in chosen
         )
-        body = f'<section class="stills">{shots}</section>' if chosen else "<p>none was kept</p>"
+        body = (
+            f'<section class="stills">{shots}</section>' if chosen else "<p>none was recorded</p>"
+        )
         parts.append(heading + body)
     return "".join(parts)
 

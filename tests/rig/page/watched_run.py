@@ -12,6 +12,7 @@ from threading import Thread
 import numpy as np
 
 from tests.rig.command_line import RIG
+from tests.rig.log_lines import log_lines
 
 LIMIT_S = 120.0
 
@@ -31,7 +32,7 @@ class WatchedRun:
 
     def first_reduced_s(self) -> float:
         """When the first command of the ramp was sent, which is slower than the one before."""
-        entries = [json.loads(line) for line in (self.out / "log.jsonl").read_text().splitlines()]
+        entries = log_lines(self.out)
         ramp = next(n for n, entry in enumerate(entries) if entry.get("event") == "state stopping")
         before = [entry for entry in entries[:ramp] if entry["kind"] == "command"][-1]
         first = next(entry for entry in entries[ramp:] if entry["kind"] == "command")

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.log.run_log import LOG_NAME
 from rig.recorded import read_run
 from rig.report.headline import JUDGED, STATED, error_bar
 from tests.rig.command_line import rig
+from tests.rig.log_lines import log_bytes
 from tests.rig.report.recorded_runs import record
 
 
@@ -49,8 +51,8 @@ def test_a_run_cut_off_anywhere_is_reported_as_far_as_it_came(
     recorded: Path, tmp_path: Path, share: float
 ) -> None:
     run_dir = copy_of(recorded, tmp_path / "killed", without=("summary.json",))
-    log = (recorded / "log.jsonl").read_bytes()
-    (run_dir / "log.jsonl").write_bytes(log[: int(share * len(log))])
+    log = log_bytes(recorded)
+    (run_dir / LOG_NAME).write_bytes(log[: int(share * len(log))])
     result = rig("report", str(run_dir))
     assert result.exit_code == 0, result.stderr
     assert "cut off" in result.stderr
@@ -90,9 +92,9 @@ def test_runs_are_listed_newest_first_whatever_became_of_them(
     [
         (lambda run: (run / "setup.json").unlink(), "setup.json"),
         (lambda run: (run / "setup.json").write_text("{}"), "setup.json"),
-        (lambda run: (run / "log.jsonl").unlink(), "log.jsonl"),
-        (lambda run: (run / "log.jsonl").write_text('{"kind": "arm"}\n'), "log.jsonl"),
-        (lambda run: (run / "config.yaml").write_text("nonsense: 1\n"), "nonsense"),
+        (lambda run: (run / LOG_NAME).unlink(), LOG_NAME),
+        (lambda run: (run / LOG_NAME).write_text("no log"), LOG_NAME),
+        (lambda run: (run / LOG_NAME).write_bytes(b""), LOG_NAME),
     ],
 )
 def test_a_directory_that_cannot_be_read_is_refused_with_the_file_named(

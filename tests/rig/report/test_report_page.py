@@ -5,6 +5,7 @@ from pathlib import Path
 
 from tests.rig.browser import new_page
 from tests.rig.command_line import rig
+from tests.rig.log_lines import log_lines
 from tests.rig.report.recorded_runs import record
 
 FIGURES = {
@@ -48,5 +49,5 @@ def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> No
         assert shown == summary
         assert radii[index].startswith(f"{1e3 * summary['radius_m']:.4f}")
     assert len(images) >= 6 and set(images) == {640}
-    log = [json.loads(line) for line in (tmp_path / "a" / "log.jsonl").read_text().splitlines()]
+    log = log_lines(tmp_path / "a")
     assert len(times) == len([entry for entry in log if entry["kind"] == "event"])
