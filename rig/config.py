@@ -48,10 +48,15 @@ class EstimatorConfig(Section):
 class MotionConfig(Section):
     """How the camera moves, in its own axes."""
 
-    policy: Literal["constant", "paper"] = "constant"
+    # information: to where the radius becomes known soonest; circle: a plain arc.
+    policy: Literal["constant", "paper", "information", "circle"] = "constant"
     velocity_m_s: tuple[Finite, Finite, Finite] = (-0.05, 0.0, 0.0)
     k1: NotNegative = 10.0  # eq. (24): holds the norm of v
     k2: NotNegative = 1.0  # eq. (24): turns v towards the largest sigma1²
+    circle_radius_m: Positive = 0.03
+    # How far information may take the camera from the target's surface, for the sake of focus;
+    # how near it may, stands under safety.
+    max_target_distance_m: Positive = 1.0
     centring_gain_per_s: Annotated[float, Field(gt=0, le=10)] = 5.0
 
 
@@ -100,6 +105,11 @@ class RigConfig(Section):
             raise ValueError(
                 "run.until_share (--until) needs an estimator that states how sure it is: "
                 "set estimator.kind=kalman; the observer has run.until_converged"
+            )
+        if self.motion.policy == "information" and self.estimator.kind == "observer":
+            raise ValueError(
+                "motion.policy = information needs an estimator that states how sure it is: "
+                "set estimator.kind=kalman"
             )
         if self.arm.hold_s <= 1.0 / self.run.control_rate_hz:
             raise ValueError(

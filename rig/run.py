@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.clock import Clock, WallClock, local_timestamp, time_of_day_offset_ns
+from estimator.active.circle import CircularVelocity
 from estimator.active.controller import Controller
+from estimator.active.information_policy import InformationPolicy, Walls
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.estimate import Estimator
 from estimator.image.intrinsics import Intrinsics
@@ -34,6 +36,7 @@ from rig.rehearsal import rehearse
 from rig.run_data import RunData
 from rig.safety import Limiter
 from rig.summary import summarise
+from rig.walls import walls_around
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +79,11 @@ def execute(
         data = RunData(target=target, T_tool_camera=rig.T_tool_camera)
         # What has to be compiled is compiled here, before time counts.
         fusion = make_fusion(config, target, data, log)
-        controller = make_controller(config.motion)
+        controller = make_controller(
+            config.motion,
+            config.safety.min_target_distance_m,
+            walls_around(config.safety, rig.T_tool_camera, lambda: fusion.state),
+        )
         envelope = Envelope(config.safety, rig.T_tool_camera, rig.intrinsics)
         wall: Clock = WallClock()
         wall_start_s = wall.now_s()
@@ -191,11 +198,20 @@ def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: Fusio
     return Fusion(make_observer(config, target), data, log, max_extrapolation_s, latency_s)
 
 
-def make_controller(motion: MotionConfig) -> Controller:
-    """The camera motion that the configuration asks for."""
+def make_controller(
+    motion: MotionConfig,
+    least_distance_m: float = 0.0,
+    walls: Callable[[], Walls | None] = lambda: None,
+) -> Controller:
+    """The camera motion that the configuration asks for; what bounds it, where it plans ahead."""
     policy: VelocityPolicy
     if motion.policy == "constant":
         policy = ConstantVelocity(motion.velocity_m_s)
+    elif motion.policy == "circle":
+        policy = CircularVelocity(motion.velocity_m_s, motion.circle_radius_m)
+    elif motion.policy == "information":
+        most_m = motion.max_target_distance_m
+        policy = InformationPolicy(motion.velocity_m_s, least_distance_m, most_m, walls)
     else:
         policy = PaperPolicy(motion.velocity_m_s, motion.k1, motion.k2)
     return Controller(policy, motion.centring_gain_per_s)

@@ -29,7 +29,7 @@ class SimulatedArm:
         self._next = 0  # number of the first sample not returned yet
         self._closed = False
         self._q: FloatArray | None = None  # (6,) joints at the newest reported sample
-        tool_jacobian(np.zeros(6))
+        self._twist_std: FloatArray | None = None  # (6,), that of the first sample for all
         # Compiles the kernels now rather than in the middle of a run.
         _measure(np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 6)), self._steps)
 
@@ -52,10 +52,12 @@ class SimulatedArm:
         numbers, noise = numbers[kept], noise[kept]
         q, qd = history.entries(numbers)
         self._q = q[-1]
+        if self._twist_std is None:
+            self._twist_std = np.linalg.norm(tool_jacobian(self._q) * self._noise, axis=1)
         poses, twists = _measure(q, qd, noise, self._steps)
         times = history.start_s + numbers * history.step_s
         return [
-            ArmState(t_s=float(t), T_base_tool=T, twist_tool=twist)
+            ArmState(float(t), T_base_tool=T, twist_tool=twist, twist_std=self._twist_std)
             for t, T, twist in zip(times, poses, twists, strict=True)
         ]
 

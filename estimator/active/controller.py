@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.active.centring import centring_omega
-from estimator.active.policy import VelocityPolicy
+from estimator.active.policy import InformedPolicy, VelocityPolicy
 from estimator.estimate import Estimate
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +32,8 @@ class Controller:
 
     def twist(self, estimate: Estimate, dt_s: float) -> FloatArray:
         """The camera's twist (6,) (v, ω) for now; the policy's velocity then moves on ``dt_s``."""
+        if isinstance(self._policy, InformedPolicy):
+            self._policy.inform(estimate)
         v = self._policy.v
         omega = centring_omega(estimate.s, estimate.axis, estimate.chi, v, self._gain_per_s)
         norm = float(np.linalg.norm(omega))

@@ -1,11 +1,12 @@
 """What the camera's linear velocity should be: constant, or turned by (24) to tell the most."""
 
 import math
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimator.estimate import Estimate
 from estimator.jit import jit, jit_template
 
 FloatArray = NDArray[np.float64]
@@ -27,6 +28,15 @@ class VelocityPolicy(Protocol):
 
     def advance(self, axis: FloatArray | None, omega: FloatArray, dt_s: float) -> None:
         """Let ``dt_s`` pass while the camera turns at ω (3,) and a is ``axis`` (None: sphere)."""
+        ...
+
+
+@runtime_checkable
+class InformedPolicy(Protocol):
+    """A policy that goes by what is known of the target."""
+
+    def inform(self, estimate: Estimate) -> None:
+        """Take the newest estimate into account."""
         ...
 
 

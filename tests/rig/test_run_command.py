@@ -224,3 +224,18 @@ def test_an_interval_that_nobody_states_cannot_end_a_run(
     assert result.exit_code == 2
     assert words in result.stderr
     assert not (tmp_path / "run").exists()
+
+
+def test_moving_for_information_beats_moving_along_the_line_of_sight(tmp_path: Path) -> None:
+    settings = (
+        *("--set", "estimator.kind=kalman", "--set", "sim.level=features"),
+        *("--set", "sim.features.noise_px=0.1", "--set", "motion.velocity_m_s=[0, 0, 0.05]"),
+        *("--duration", "1.5"),
+    )
+    took_s = {}
+    for policy in ("constant", "information"):
+        out = tmp_path / policy
+        arguments = ("--target", "sphere", *settings, "--set", f"motion.policy={policy}")
+        took_s[policy] = run_json(*arguments, out=out)["time_to_1pct_s"]
+    assert took_s["information"] <= 0.3
+    assert took_s["constant"] is None or took_s["constant"] >= 2.0 * took_s["information"]
