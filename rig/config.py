@@ -18,7 +18,7 @@ TargetKind = Literal["sphere", "cylinder"]
 class EstimatorConfig(Section):
     """Which estimator, its first guess, and what it needs to know."""
 
-    kind: Literal["observer", "kalman"] = "observer"
+    kind: Literal["observer", "kalman", "batch", "triangulation"] = "observer"
     # Of the observer.
     alpha: Annotated[float, Field(gt=0, le=1e6)] = 2000.0
     damping: Annotated[float, Field(gt=0, le=20)] = 1.0  # multiple of c* = 2 sqrt(alpha) sigma
@@ -38,6 +38,11 @@ class EstimatorConfig(Section):
                 f"radius_range_m = [{low_m:g}, {high_m:g}]"
             )
         return self
+
+    @property
+    def states_variance(self) -> bool:
+        """Whether the chosen estimator says how sure it is."""
+        return self.kind in ("kalman", "batch")
 
     @property
     def radius_range(self) -> tuple[float, float]:
@@ -101,12 +106,12 @@ class RigConfig(Section):
                 f"motion.velocity_m_s asks for {speed_m_s:.3g} m/s, above "
                 f"safety.max_linear_speed_m_s = {self.safety.max_linear_speed_m_s:.3g}"
             )
-        if self.run.until_share is not None and self.estimator.kind == "observer":
+        if self.run.until_share is not None and not self.estimator.states_variance:
             raise ValueError(
                 "run.until_share (--until) needs an estimator that states how sure it is: "
                 "set estimator.kind=kalman; the observer has run.until_converged"
             )
-        if self.motion.policy == "information" and self.estimator.kind == "observer":
+        if self.motion.policy == "information" and self.estimator.kind != "kalman":
             raise ValueError(
                 "motion.policy = information needs an estimator that states how sure it is: "
                 "set estimator.kind=kalman"

@@ -10,12 +10,14 @@ from estimator.active.circle import CircularVelocity
 from estimator.active.controller import Controller
 from estimator.active.information_policy import InformationPolicy, Walls
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
+from estimator.batch import BatchLeastSquares
 from estimator.estimate import Estimator
 from estimator.image.intrinsics import Intrinsics
 from estimator.kalman import KalmanFilter, RadiusPrior, TwistNoise
 from estimator.models.cylinder import Cylinder
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
+from estimator.triangulation import Triangulation
 from rig.analysis import Analysis, analyse
 from rig.background_view import BackgroundView
 from rig.build import Rig, build_rig
@@ -185,7 +187,11 @@ def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
     estimator = config.estimator
     if estimator.kind == "observer":
         return Observer(model, estimator.alpha, estimator.damping, estimator.radius_guess_m)
+    if estimator.kind == "triangulation":
+        return Triangulation(model, estimator.radius_guess_m)
     prior = RadiusPrior(estimator.radius_guess_m, *estimator.radius_range)
+    if estimator.kind == "batch":
+        return BatchLeastSquares(model, prior)
     noise = TwistNoise(estimator.twist_std_m_s, estimator.twist_std_rad_s)
     return KalmanFilter(model, prior, noise)
 

@@ -116,7 +116,7 @@ def run(
                 write_reports([read_run(run_dir)], run_dir)
         except (OSError, ConfigError) as error:  # what was measured stands all the same
             warn(f"warning: {run_dir} is not complete: {error}")
-    _explain(result)
+    _explain(result, config.estimator.kind == "observer")
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
         raise typer.Exit(code)
@@ -134,7 +134,7 @@ def _share(text: str) -> float:
     return value
 
 
-def _explain(result: "RunResult") -> None:
+def _explain(result: "RunResult", transient: bool) -> None:
     """Say on stderr what a number alone would hide."""
     outcome = result.outcome
     if outcome.error is not None:
@@ -143,7 +143,7 @@ def _explain(result: "RunResult") -> None:
         warn(f"no radius: {outcome.ending.value}; {outcome.target_state}")
     elif result.summary["radius_std_m"] is not None:
         _explain_interval(result)
-    elif outcome.remaining_fraction > _SETTLED:
+    elif transient and outcome.remaining_fraction > _SETTLED:
         warn(
             f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
             "error is left; run longer, faster or with a larger estimator.alpha"
