@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from estimator.ideal import ideal_response, rms_vs_ideal, time_to_within
 from rig.config import RigConfig
+from rig.efficiency import radius_bound_m
 from rig.run_data import ArmTrack, RunData, UpdateTrack
 
 FloatArray = NDArray[np.float64]
@@ -34,6 +35,7 @@ class Analysis:
     relative_error: float | None
     chi_std: FloatArray | None  # (k,) as stated, 1/m
     nees: float | None  # (z / chi_std)² at the end
+    radius_bound_m: float | None  # the least standard deviation of R at the end
 
 
 def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> Analysis:
@@ -77,7 +79,16 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         relative_error=relative,
         chi_std=None if updates.variance is None else np.sqrt(updates.variance),
         nees=_nees(z, updates),
+        radius_bound_m=_bound_m(data, config, radius_true_m),
     )
+
+
+def _bound_m(data: RunData, config: RigConfig, radius_true_m: float | None) -> float | None:
+    """At the true radius, or else at the estimated one."""
+    radius_m = radius_true_m
+    if radius_m is None and data.updates:
+        radius_m = data.updates[-1].radius_m
+    return None if radius_m is None else radius_bound_m(data, config.estimator, radius_m)
 
 
 def _nees(z: FloatArray | None, updates: UpdateTrack) -> float | None:

@@ -176,5 +176,6 @@ class Fusion:
             self._doubt = update.doubt
             self._log.event(t_s, "estimate doubted", update.doubt or "no longer")
         self._data.updates.append(update)
+        self._data.features.append(feature)
         self._data.add_snapshot(Snapshot(t_s, sighting.frame.image, feature))
         self._log.estimate("update", update)

@@ -56,6 +56,7 @@ class RunData:
     T_tool_camera: FloatArray  # (4, 4)
     arm_states: list[ArmState] = field(default_factory=list)
     updates: list[Estimate] = field(default_factory=list)
+    features: list[Feature] = field(default_factory=list)  # one per update: what led to it
     snapshots: list[Snapshot] = field(default_factory=list)
     newest_snapshot: Snapshot | None = None
     camera_from_tool: FloatArray = field(init=False)  # (6, 6) maps the tool's twist

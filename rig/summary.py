@@ -81,6 +81,7 @@ def summarise(
         "error": None if outcome.error is None else str(outcome.error),
         "target_state": outcome.target_state,
         "doubts": outcome.data.doubts(),
+        "radius_bound_m": analysis.radius_bound_m,
         "holds": outcome.holds,
         "last_hold": outcome.last_hold,
         "arm_at_rest": outcome.at_rest,
