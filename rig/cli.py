@@ -8,6 +8,7 @@ from drivers.errors import RigError
 from rig.commands.arm import arm_app
 from rig.commands.calibrate import calibrate_app
 from rig.commands.camera import camera_app
+from rig.commands.compare import compare
 from rig.commands.doctor import EXIT_CODES as DOCTOR_EXIT_CODES
 from rig.commands.doctor import doctor
 from rig.commands.log import log_app
@@ -37,6 +38,7 @@ app.command(epilog=HELP)(reproduce)
 app.command()(report)
 app.command()(runs)
 app.command()(view)
+app.command()(compare)
 app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")

@@ -1,0 +1,77 @@
+"""Which runs a comparison consists of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal, get_args
+
+from rig.config import TargetKind
+
+EstimatorKind = Literal["observer", "kalman", "batch", "triangulation"]
+PolicyKind = Literal["constant", "paper", "information", "circle"]
+NoiseKind = Literal["clean", "hard", "laggy", "lossy"]
+
+# What each condition lays over the rig, whether images are drawn or not.
+CONDITIONS: dict[NoiseKind, tuple[str, ...]] = {
+    "clean": (),
+    "hard": (
+        "sim.features.noise_px=0.02",
+        "sim.camera.noise_grey=5",
+        "sim.camera.exposure_s=0.012",
+        "sim.light.ambient=0.35",
+        "sim.background.high_grey=90",
+    ),
+    "laggy": (
+        "sim.camera.latency_s=0.12",
+        "sim.camera.latency_jitter_s=0.02",
+        "sim.arm.slide_lag_s=0.06",
+        "sim.arm.wrist_lag_s=0.05",
+    ),
+    "lossy": ("sim.camera.drop_probability=0.3", "sim.features.lost_probability=0.1"),
+}
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Case:
+    """One run."""
+
+    target: TargetKind
+    noise: NoiseKind
+    policy: PolicyKind
+    estimator: EstimatorKind
+    seed: int
+
+    @property
+    def assignments(self) -> list[str]:
+        """What is laid over the configuration."""
+        return [
+            *CONDITIONS[self.noise],
+            f"motion.policy={self.policy}",
+            f"estimator.kind={self.estimator}",
+            f"sim.seed={self.seed}",
+        ]
+
+
+def cases_of(
+    target: TargetKind,
+    estimators: Sequence[EstimatorKind],
+    policies: Sequence[PolicyKind],
+    noises: Sequence[NoiseKind],
+    seeds: int,
+) -> list[Case]:
+    """All combinations that go together: moving for information needs the filter."""
+    return [
+        Case(target, noise, policy, estimator, seed)
+        for noise, policy, estimator, seed in product(noises, policies, estimators, range(seeds))
+        if policy != "information" or estimator == "kalman"
+    ]
+
+
+def chosen(text: str, kinds: object, option: str) -> list[str]:
+    """The names in a comma-separated list; raises ValueError for one that is none of ``kinds``."""
+    known = get_args(kinds)
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    wrong = [name for name in names if name not in known]
+    if wrong or not names:
+        raise ValueError(f"{option} {text!r}: choose from {', '.join(known)}, separated by commas")
+    return list(dict.fromkeys(names))
