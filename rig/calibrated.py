@@ -37,17 +37,28 @@ def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig
     """
     if uncalibrated:
         return with_nominal(config), "nominal values (--uncalibrated)"
-    path = calibration_path(config)
-    if config.calibration.file is None and not path.exists():
+    found = calibration_in_use(config)
+    if found is None:
         given = config.calibration.intrinsics is not None
         return config, "given in the rig file" if given else "the device's own"
+    return _with_values(config, found), str(calibration_path(config))
+
+
+def calibration_in_use(config: RigConfig) -> CalibrationFile | None:
+    """The rig's calibration; None when there is none and the configuration asks for none.
+
+    Raises ConfigError for a file that is named but missing, failed or out of date.
+    """
+    path = calibration_path(config)
+    if config.calibration.file is None and not path.exists():
+        return None
     found = load_calibration(path)
     if found.rig != config.name:
         raise ConfigError(f"{path} is the calibration of the rig {found.rig}, not {config.name}")
     # The board only matters for calibrating: another one in the configuration changes nothing.
     now = {key: value for key, value in fingerprints(config).items() if key != "board"}
     check_usable(found, now, path)
-    return _with_values(config, found), str(path)
+    return found
 
 
 def with_nominal(config: RigConfig) -> RigConfig:

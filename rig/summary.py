@@ -7,6 +7,7 @@ import numpy as np
 from rich.table import Table
 
 from rig.analysis import Analysis
+from rig.calibration_limits import CalibrationLimits
 from rig.config import RigConfig, TargetKind
 from rig.outcome import Ending, RunOutcome
 from rig.records import Json
@@ -17,6 +18,8 @@ JSON_KEYS = (
     "radius_m",
     "radius_true_m",
     "relative_error",
+    "radius_calibration_std_m",
+    "radius_calibration_parts_m",
     "rms_vs_ideal",
     "time_to_1pct_s",
     "radius_std_m",
@@ -63,6 +66,7 @@ def summarise(
         "radius_m": radius_m,
         "radius_true_m": analysis.radius_true_m,
         "relative_error": None if radius_m is None else analysis.relative_error,
+        **limits_of(None),
         "rms_vs_ideal": analysis.rms_vs_ideal,
         "time_to_1pct_s": analysis.time_to_1pct_s,
         "radius_std_m": None if radius_m is None else outcome.data.updates[-1].radius_std_m,
@@ -94,6 +98,14 @@ def summarise(
     }
 
 
+def limits_of(limits: CalibrationLimits | None) -> dict[str, Json]:
+    """What the calibration limits the radius to; None where its deviations are not known."""
+    return {
+        "radius_calibration_std_m": None if limits is None else limits.total_m,
+        "radius_calibration_parts_m": None if limits is None else dict(limits.parts_m),
+    }
+
+
 def table(summary: Mapping[str, Json]) -> Table:
     """The final table."""
     out = Table(title=f"{summary['target']}: {summary['ending']}", show_header=False)
@@ -105,6 +117,7 @@ def table(summary: Mapping[str, Json]) -> Table:
         ("radius", _radius(summary)),
         ("true radius", _number(summary["radius_true_m"], "{:.4f} mm", 1e3)),
         ("relative error", _number(summary["relative_error"], "{:+.3f} %", 1e2)),
+        ("the calibration limits it to", _limits(summary)),
         ("position", where),
         ("rms from the ideal response", _number(summary["rms_vs_ideal"], "{:.3f} % of z(0)", 1e2)),
         ("transient left", _number(summary["transient_left"], "{:.2f} %", 1e2)),
@@ -147,6 +160,18 @@ def _radius(summary: Mapping[str, Json]) -> str:
     radius = _number(summary["radius_m"], "{:.4f} mm", 1e3)
     std_m = summary["radius_std_m"]
     return radius if std_m is None else f"{radius} ± {_number(std_m, '{:.4f} mm', 1e3)} (1σ)"
+
+
+def _limits(summary: Mapping[str, Json]) -> str:
+    total_m, parts_m = (summary[f"radius_calibration_{key}_m"] for key in ("std", "parts"))
+    if not isinstance(parts_m, Mapping):
+        return "–"
+    parts = [f"{_mm(std)} from {name.replace('_', '-')}" for name, std in parts_m.items()]
+    return f"{_mm(total_m)}: {', '.join(parts)}"
+
+
+def _mm(std_m: Json) -> str:
+    return f"± {1e3 * std_m:.2g} mm" if isinstance(std_m, float) else "–"
 
 
 def _number(value: Json, pattern: str, factor: float = 1.0) -> str:

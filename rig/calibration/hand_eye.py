@@ -24,6 +24,9 @@ from rig.config_section import NotNegative, Section
 
 FloatArray = NDArray[np.float64]
 
+# What a run uses; the board is only there for calibrating.
+_RIG = np.r_[CAMERA, INTRINSICS]
+
 
 class HandEyeSettings(Section):
     """How the hand-eye transform is fitted and judged."""
@@ -51,6 +54,7 @@ class HandEyeFit:
     bootstrap_xyz_m: FloatArray  # (3,)
     bootstrap_rotvec_rad: FloatArray  # (3,)
     covariance: FloatArray  # (6, 6) of a small motion of the camera in its own axes
+    joint_covariance: FloatArray  # (15, 15) of that and the intrinsics together
     T_base_board: FloatArray  # (4, 4)
     board_covariance: FloatArray  # (6, 6) of a small motion of the board in its own axes
     intrinsics: Intrinsics  # refined
@@ -115,6 +119,7 @@ def solve_hand_eye(
         bootstrap_xyz_m=drawn_xyz_m,
         bootstrap_rotvec_rad=drawn_rotvec_rad,
         covariance=spread.covariance[CAMERA, CAMERA],
+        joint_covariance=spread.covariance[np.ix_(_RIG, _RIG)],
         T_base_board=state.T_base_board,
         board_covariance=spread.covariance[BOARD, BOARD],
         intrinsics=from_vector(state.intrinsics),

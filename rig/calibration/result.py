@@ -58,6 +58,8 @@ class HandEyeResult(Section):
     tool_camera_rotvec_rad: Vec3
     std_xyz_m: Std3
     std_rotvec_rad: Std3
+    # (15, 15) of a small motion of the camera in its own axes (m, rad) and of the intrinsics.
+    covariance: tuple[tuple[Finite, ...], ...] | None = None
     base_board_xyz_m: Vec3
     base_board_rotvec_rad: Vec3
     obtained: str
@@ -129,7 +131,13 @@ def fingerprint(value: Json) -> str:
 def save_calibration(calibration: CalibrationFile, path: Path) -> None:
     """Write the file as a whole or not at all; raises ConfigError when it cannot be written."""
     data = calibration.model_dump(mode="json", exclude_none=True)
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+    text = yaml.safe_dump(
+        data,
+        sort_keys=False,
+        allow_unicode=True,
+        width=100,
+        default_flow_style=None,
+    )
     partial = path.with_name(f"{path.name}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -62,6 +62,7 @@ def hand_eye_result(fit: HandEyeFit, depends_on: Fingerprints) -> HandEyeResult:
         tool_camera_rotvec_rad=_three(se3.rotation_vectors(fit.T_tool_camera[:3, :3])),
         std_xyz_m=_three(fit.std_xyz_m),
         std_rotvec_rad=_three(fit.std_rotvec_rad),
+        covariance=tuple(tuple(row) for row in fit.joint_covariance.tolist()),
         base_board_xyz_m=_three(fit.T_base_board[:3, 3]),
         base_board_rotvec_rad=_three(se3.rotation_vectors(fit.T_base_board[:3, :3])),
         obtained=f"{fit.start}, then least reprojection error over {len(fit.used)} poses",

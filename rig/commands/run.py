@@ -23,6 +23,9 @@ from rig.commands.options import (
 from rig.exit_codes import ExitCode
 
 if TYPE_CHECKING:
+    from rig.calibration.result import CalibrationFile
+    from rig.config import RigConfig
+    from rig.records import Json
     from rig.run import RunResult
 
 # Below this the radius is the observer's, above it is still partly the first guess.
@@ -77,7 +80,7 @@ def run(
 ) -> None:
     """Move the camera, estimate the target's radius and pose, write a run directory."""
     from drivers.errors import ConfigError
-    from rig.calibrated import calibrated, calibration_path
+    from rig.calibrated import calibrated, calibration_in_use, calibration_path
     from rig.config_load import load_config
     from rig.page.address import page_address
     from rig.page.watching import watching
@@ -93,7 +96,9 @@ def run(
     extra += [] if seed is None else [f"sim.seed={seed}"]
     extra += ["run.until_converged=true"] if until_converged else []
     extra += [] if until is None else [f"run.until_share={_share(until)!r}"]
-    config, source = calibrated(load_config(target, rig, extra), uncalibrated)
+    loaded = load_config(target, rig, extra)
+    config, source = calibrated(loaded, uncalibrated)
+    calibration = None if uncalibrated else calibration_in_use(loaded)
     warn(f"calibration: {source}")
     address = page_address(view_host, view_port, view_token) if view else None
     run_dir = make_run_dir(out, target)
@@ -107,6 +112,7 @@ def run(
                 *(config, target, run_dir, realtime, shown, stopped, source),
                 attachments=tuple(p for p in [calibration_path(config)] if str(p) == source),
             )
+        result.summary.update(_limits(result, config, calibration))
         if as_json:
             print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
         console.print(table(result.summary))
@@ -132,6 +138,22 @@ def _share(text: str) -> float:
     if rest or not 0.0 < value < 1.0:
         raise typer.BadParameter(f"--until {text!r}: write it as 0.5% or 0.005")
     return value
+
+
+def _limits(
+    result: "RunResult", config: "RigConfig", calibration: "CalibrationFile | None"
+) -> "dict[str, Json]":
+    """What the calibration limits the radius to, where it says how sure it is."""
+    from rig.calibration.spread import covariance_of
+    from rig.calibration_limits import calibration_limits
+    from rig.run import make_observer
+    from rig.summary import limits_of
+
+    covariance = None if calibration is None else covariance_of(calibration)
+    if covariance is None or result.summary["radius_m"] is None:
+        return limits_of(None)
+    data = result.outcome.data
+    return limits_of(calibration_limits(data, config, result.intrinsics, covariance, make_observer))
 
 
 def _explain(result: "RunResult", transient: bool) -> None:
