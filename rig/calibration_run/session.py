@@ -11,7 +11,7 @@ from drivers.clock import local_timestamp
 from drivers.interfaces import GreyImage
 from rig.calibration import se3
 from rig.calibration.board import corner_points
-from rig.calibration.detection import BoardDetector
+from rig.calibration.detection import BoardDetector, Detection
 from rig.calibration.errors import CalibrationError
 from rig.calibration.excitation import Excitation
 from rig.calibration.latency import LatencyFit
@@ -162,7 +162,7 @@ class Session:
                     self._bench.camera,
                     self._mover,
                     self._bench.clock,
-                    self._detect,
+                    self._detect_quickly,
                     motions,
                     geometry.hand_eye.T_tool_camera,
                 )
@@ -229,10 +229,11 @@ class Session:
         return stills
 
     def _detect(self, image: GreyImage) -> BoardView:
-        found = self._detector.find(image)
-        if found.view is None:
-            raise CalibrationError(found.reason)
-        return found.view
+        return _view(self._detector.find(image))
+
+    def _detect_quickly(self, image: GreyImage) -> BoardView:
+        """For hundreds of moving pictures, where blur is what limits."""
+        return _view(self._detector.find(image, fine=False))
 
     def _named(self, *names: str) -> Fingerprints:
         return {name: self._depends_on[name] for name in names if name in self._depends_on}
@@ -242,3 +243,9 @@ class Session:
         cleared = {} if "verdict" in sections else {"verdict": None}
         self.file = self.file.model_copy(update={"made": local_timestamp(), **cleared, **sections})
         save_calibration(self.file, self._path)
+
+
+def _view(found: Detection) -> BoardView:
+    if found.view is None:
+        raise CalibrationError(found.reason)
+    return found.view
