@@ -86,7 +86,7 @@ def _inside(rays: FloatArray, lens: Intrinsics, size: tuple[int, int]) -> FloatA
     near = rays[..., 2] * widest > np.linalg.norm(rays[..., :2], axis=2)
     pixels = lens.project(np.where(near[..., None], rays, _AHEAD))
     within = np.all((pixels > -0.5) & (pixels < np.array(size) - 0.5), axis=2)
-    return (within & near).astype(float)
+    return np.asarray(within & near, dtype=float)
 
 
 def _plane(rays: FloatArray, seen: FloatArray, near: FloatArray) -> FloatArray:

@@ -43,27 +43,41 @@ def coarse_latency(
     agreement, or more than one lag that fits.
     """
     times = np.array([view.t_s for view in views])
-    outline = _outline(views)
-    intrinsics = from_vector(state.intrinsics)
-    seen = _pixels(board_poses([v.board for v in views], intrinsics), outline, intrinsics)
-    moved = np.diff(seen, axis=0)
+    moved = np.diff(_seen(views, state), axis=0)
     speed = float(np.sqrt(np.mean((moved / np.diff(times)[:, None]) ** 2) * 2.0))
     if speed < _MIN_SPEED_PX_S:
         raise CalibrationError(
             f"the image moves at only {speed:.1f} px/s rms, too slowly to time it: wiggle the "
             "camera across the board at 0.5 Hz and more, by a centimetre or two"
         )
-    steps = int((arm.end_s - arm.start_s) / _STEP_S)
-    # Not np.arange with an end: rounding can put its last value behind that.
-    grid = np.minimum(arm.start_s + _STEP_S * np.arange(steps + 1), arm.end_s)
-    predicted = _pixels(board_seen(state, arm.poses(grid)), outline, intrinsics)
-    lags, correlations = _correlate(times, moved, grid, predicted, range_s)
+    lags, correlations = correlation_over_lag(views, arm, state, range_s)
     if len(lags) == 0:
         raise CalibrationError(
             "the arm's record hardly overlaps the images: record both over the same time, the "
             f"arm {range_s:.1f} s longer on both sides"
         )
     return _peak(lags, correlations, speed, range_s)
+
+
+def correlation_over_lag(
+    views: Sequence[StampedView], arm: Trajectory, state: State, range_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Lags (k,), s, that can be judged, and how predicted and seen motion correlate at each."""
+    times = np.array([view.t_s for view in views])
+    steps = int((arm.end_s - arm.start_s) / _STEP_S)
+    # Not np.arange with an end: rounding can put its last value behind that.
+    grid = np.minimum(arm.start_s + _STEP_S * np.arange(steps + 1), arm.end_s)
+    intrinsics = from_vector(state.intrinsics)
+    predicted = _pixels(board_seen(state, arm.poses(grid)), _outline(views), intrinsics)
+    moved = np.diff(_seen(views, state), axis=0)
+    return _correlate(times, moved, grid, predicted, range_s)
+
+
+def _seen(views: Sequence[StampedView], state: State) -> FloatArray:
+    """Where the board's outline was in each image (m, 8)."""
+    intrinsics = from_vector(state.intrinsics)
+    poses = board_poses([view.board for view in views], intrinsics)
+    return _pixels(poses, _outline(views), intrinsics)
 
 
 def _correlate(

@@ -15,6 +15,7 @@ from rig.exit_codes import ExitCode
 if TYPE_CHECKING:
     from rig.calibration.result import CalibrationFile
     from rig.calibration_run.session import Session
+    from rig.calibration_run.store import Store
     from rig.config import RigConfig
 
 calibrate_app = typer.Typer(
@@ -174,11 +175,34 @@ def _run(step: Step, request: Request) -> None:
             stop_requested,
         )
         found = _steps(session, step)
-    summary = json_of(session, found, path, wall.now_s() - start_s)
+    report = _report(session, store, found, path)
+    summary = {**json_of(session, found, path, wall.now_s() - start_s), "report": report}
     if request.as_json:
         print(json.dumps(summary), flush=True)
     console.print(table(summary))
     _finish(found, config, path)
+
+
+def _report(session: "Session", store: "Store", found: "CalibrationFile", path: Path) -> str | None:
+    """Write the report beside the calibration; where it is, None when that fails."""
+    from rig.calibration_report.material import Material
+    from rig.calibration_report.page import write_report
+
+    material = Material(
+        found,
+        store.stills,
+        session.geometry,
+        store.recording,
+        session.latency,
+        session.verification,
+    )
+    try:
+        page = write_report(path.with_name(f"{found.rig}-report"), material)
+    except OSError as error:  # the result stands all the same
+        warn(f"no report: {error}")
+        return None
+    warn(f"report: {page}")
+    return str(page)
 
 
 def _steps(session: "Session", step: Step) -> "CalibrationFile":
