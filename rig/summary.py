@@ -35,6 +35,8 @@ JSON_KEYS = (
     "seed",
     "run_dir",
 )
+_PART_NAMES = {"hand_eye": "hand-eye", "focal_length": "focal length"}
+_LEAST_SHOWN_M = 1e-7
 _WITH_RADIUS = (Ending.TIME, Ending.CONVERGED, Ending.INTERRUPTED)
 
 
@@ -166,12 +168,14 @@ def _limits(summary: Mapping[str, Json]) -> str:
     total_m, parts_m = (summary[f"radius_calibration_{key}_m"] for key in ("std", "parts"))
     if not isinstance(parts_m, Mapping):
         return "–"
-    parts = [f"{_mm(std)} from {name.replace('_', '-')}" for name, std in parts_m.items()]
+    parts = [f"{_mm(std)} from {_PART_NAMES.get(name, name)}" for name, std in parts_m.items()]
     return f"{_mm(total_m)}: {', '.join(parts)}"
 
 
 def _mm(std_m: Json) -> str:
-    return f"± {1e3 * std_m:.2g} mm" if isinstance(std_m, float) else "–"
+    if not isinstance(std_m, float):
+        return "–"
+    return f"± {1e3 * std_m:.2g} mm" if std_m >= _LEAST_SHOWN_M else "less than ± 0.0001 mm"
 
 
 def _number(value: Json, pattern: str, factor: float = 1.0) -> str:

@@ -82,8 +82,7 @@ def test_a_run_takes_the_calibration_and_measures_the_ball(folder: Path) -> None
     assert "calibration: calibration/sim.yaml" in done.stderr
     summary = json.loads(done.stdout)
     assert abs(summary["relative_error"]) < 3e-3
-    # What the calibration limits the radius to is said, and is about the error that there is.
-    assert 1e-6 < summary["radius_calibration_std_m"] < 3e-4
+    assert 1e-8 < summary["radius_calibration_std_m"] < 5e-5
     assert set(summary["radius_calibration_parts_m"]) >= {"hand_eye", "focal_length", "latency"}
     assert "the calibration limits it to" in done.stderr
 
