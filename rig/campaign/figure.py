@@ -26,7 +26,11 @@ def draw_campaign(path: Path, target: str, rows: Sequence[Row]) -> None:
     """Draw a column of panels per condition into ``path`` (PNG)."""
     noises = list(dict.fromkeys(str(row["noise"]) for row in rows))
     figure, axes = plt.subplots(
-        2, len(noises), figsize=(max(7.0, 5.2 * len(noises)), 8.4), squeeze=False, layout="constrained"
+        2,
+        len(noises),
+        figsize=(max(7.0, 5.2 * len(noises)), 8.4),
+        squeeze=False,
+        layout="constrained",
     )
     figure.suptitle(f"{target}: estimators and camera motions")
     for column, noise in enumerate(noises):
