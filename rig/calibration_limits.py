@@ -92,7 +92,7 @@ class _Again:
         self._size = (width, height)
         self._target, self._make = data.target, make
         self._config = config
-        if first > 0:  # it goes on from where the run was
+        if first > 0 and track.chi[first] > 0.0:  # it goes on from where the run was
             guess = config.estimator.model_copy(update={"radius_guess_m": 1.0 / track.chi[first]})
             self._config = config.model_copy(update={"estimator": guess})
 
