@@ -20,7 +20,7 @@ from estimator.observer import Observer
 from estimator.triangulation import Triangulation
 from rig.analysis import Analysis, analyse
 from rig.background_view import BackgroundView
-from rig.build import Rig, build_rig
+from rig.build import Rig, build_rig, is_simulated
 from rig.config import MotionConfig, RigConfig, TargetKind
 from rig.deadman import Deadman
 from rig.envelope import Envelope
@@ -122,6 +122,7 @@ def _header(
         realtime=rig.realtime,
         renderer=rig.renderer,
         radius_true_m=None if rig.truth is None else rig.truth.radius_m,
+        pictures=not (is_simulated(config) and config.sim.level == "features"),
         offset_ns=time_of_day_offset_ns() if rig.realtime else 0,
         attachments=attachments,
     )

@@ -141,10 +141,12 @@ def board(
 
 def _run(step: Step, request: Request) -> None:
     from drivers.clock import WallClock
+    from rig.build import is_simulated
     from rig.calibrated import calibration_path, fingerprints, with_nominal
     from rig.calibration.result import CalibrationFile, load_calibration
     from rig.calibration_run.bench import open_bench
     from rig.calibration_run.progress import ConsoleProgress
+    from rig.calibration_run.recorded import RecordedProgress, open_calibration_log, recorded
     from rig.calibration_run.session import Session
     from rig.calibration_run.store import Store
     from rig.calibration_run.summary import json_of, table
@@ -163,18 +165,25 @@ def _run(step: Step, request: Request) -> None:
         before = load_calibration(path)
     wall = WallClock()
     start_s = wall.now_s()
-    with StopRequest() as stop_requested, open_bench(config, request.realtime) as bench:
+    log_path = path.with_name(f"{config.name}-data") / f"log-{step}.mcap"
+    realtime = request.realtime or not is_simulated(config)
+    with (
+        StopRequest() as stop_requested,
+        open_bench(config, request.realtime) as bench,
+        open_calibration_log(log_path, config, bench, realtime) as log,
+    ):
         session = Session(
             config,
-            bench,
+            recorded(bench, log),
             store,
             path,
             before,
             depends_on,
-            ConsoleProgress(console),
+            RecordedProgress(ConsoleProgress(console), log, bench),
             stop_requested,
         )
         found = _steps(session, step)
+        log.attach(path)
     report = _report(session, store, found, path)
     summary = {**json_of(session, found, path, wall.now_s() - start_s), "report": report}
     if request.as_json:

@@ -65,7 +65,7 @@ class Encoder:
         return max(0, self._offset_ns + round(t_s * 1e9))
 
     def messages(self, entry: Entry) -> Iterator[Message]:
-        """The messages of one entry."""
+        """The messages of one entry; an attachment has none."""
         if isinstance(entry, States):
             yield from self._arm(entry)
         elif isinstance(entry, Seen):
@@ -85,7 +85,7 @@ class Encoder:
             )
         elif isinstance(entry, Ticked):
             yield self._json("tick", entry.t_s, late_s=entry.late_s, overruns=entry.overruns)
-        else:
+        elif isinstance(entry, Happened):
             yield self._event(entry)
 
     def _arm(self, entry: States) -> Iterator[Message]:
@@ -141,6 +141,11 @@ class Encoder:
 
     def _estimated(self, entry: Estimated) -> Iterator[Message]:
         estimate = entry.estimate
+        known: dict[str, Any] = {}
+        if entry.kind == "update":  # a prediction's follow from it
+            for name in ("covariance", "image_covariance"):
+                matrix = getattr(estimate, name)
+                known |= {} if matrix is None else {name: matrix.tolist()}
         yield self._json(
             entry.kind,
             estimate.t_s,
@@ -151,6 +156,8 @@ class Encoder:
             variance=estimate.variance,
             residual=estimate.residual,
             extrapolated_s=estimate.extrapolated_s,
+            doubt=estimate.doubt,
+            **known,
         )
         if entry.kind == "update":
             t_ns = self.ns(estimate.t_s)

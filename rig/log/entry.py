@@ -72,4 +72,12 @@ class Happened:
     detail: str
 
 
-Entry = States | Seen | Picture | Estimated | Commanded | Ticked | Happened
+@dataclass(frozen=True, slots=True)
+class Attached:
+    """A file that is part of what was recorded."""
+
+    name: str
+    data: bytes
+
+
+Entry = Attached | States | Seen | Picture | Estimated | Commanded | Ticked | Happened

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ _VERSIONS = ("numpy", "scipy", "numba", "opencv-python-headless", "mujoco", "mca
 class LogHeader:
     """What a run was: stored as metadata, numbers in JSON's exact notation."""
 
-    target: TargetKind
+    target: TargetKind | Literal["board"]
     config: RigConfig
     intrinsics: Intrinsics
     T_tool_camera: FloatArray  # (4, 4)
@@ -36,6 +36,7 @@ class LogHeader:
     renderer: str | None = None
     radius_true_m: float | None = None  # simulated rigs only; for error figures
     offset_ns: int = 0  # add to the rig's clock for the time of day; 0 on simulated time
+    pictures: bool = True  # False: the simulated camera's images are blank
     attachments: tuple[Path, ...] = ()  # such as the calibration's file
 
 

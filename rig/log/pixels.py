@@ -36,10 +36,8 @@ def image_message(image: GreyImage, config: LogConfig, t_ns: int) -> CompressedI
             step=width,
             data=np.ascontiguousarray(image).tobytes(),
         )
-    if config.images == "jpeg":
-        _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality])
-    else:
-        _, data = cv2.imencode(".png", image, _PNG)
+    options = [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality] if config.images == "jpeg" else _PNG
+    _, data = cv2.imencode(f".{config.images}", image, options)
     return CompressedImage(
         timestamp=timestamp(t_ns), frame_id=CAMERA, data=data.tobytes(), format=config.images
     )

@@ -7,7 +7,7 @@ length, that many bytes) is walked here; what is in the records is read by the o
 
 import io
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -19,12 +19,15 @@ from mcap.writer import MCAP0_MAGIC
 from drivers.errors import ConfigError
 
 _HEAD = struct.Struct("<BQ")  # opcode, length
-_READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
-    Opcode.SCHEMA: Schema.read,
-    Opcode.CHANNEL: Channel.read,
-    Opcode.CHUNK: Chunk.read,
-    Opcode.ATTACHMENT: Attachment.read,
-    Opcode.METADATA: Metadata.read,
+
+
+_READ: dict[int, Callable[[ReadDataStream, int], McapRecord]] = {
+    Opcode.SCHEMA: lambda stream, _: Schema.read(stream),
+    Opcode.CHANNEL: lambda stream, _: Channel.read(stream),
+    Opcode.CHUNK: lambda stream, _: Chunk.read(stream),
+    Opcode.ATTACHMENT: lambda stream, _: Attachment.read(stream),
+    Opcode.METADATA: lambda stream, _: Metadata.read(stream),
+    Opcode.MESSAGE: Message.read,
 }
 
 
@@ -52,8 +55,13 @@ def whole_until(file: IO[bytes]) -> tuple[int, bool]:
             return end, file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
 
 
-def data_section(path: Path, end: int) -> Iterator[McapRecord]:
-    """The records that hold data, chunks closed, up to ``end`` or the index."""
+def data_section(
+    path: Path, end: int, opcodes: Collection[int] = tuple(_READ)
+) -> Iterator[McapRecord]:
+    """The records that hold data, chunks closed, up to ``end`` or the index.
+
+    Others than those of ``opcodes`` are stepped over.
+    """
     with path.open("rb") as file:
         at = file.seek(len(MCAP0_MAGIC))
         while at + _HEAD.size <= end:
@@ -61,13 +69,7 @@ def data_section(path: Path, end: int) -> Iterator[McapRecord]:
             at += _HEAD.size + length
             if opcode == Opcode.DATA_END:
                 return
-            if opcode in _READ:
-                yield _READ[opcode](_stream(file, length))
-            elif opcode == Opcode.MESSAGE:
-                yield Message.read(_stream(file, length), length)
+            if opcode in opcodes:
+                yield _READ[opcode](ReadDataStream(io.BytesIO(file.read(length))), length)
             else:
                 file.seek(at)
-
-
-def _stream(file: IO[bytes], length: int) -> ReadDataStream:
-    return ReadDataStream(io.BytesIO(file.read(length)))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
     Channel,
@@ -133,11 +134,9 @@ def open_log(path: Path) -> Log:
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error}") from error
     log = Log(path, finished, {}, {}, end)
-    for item in data_section(path, end):
+    for item in data_section(path, end, (Opcode.METADATA, Opcode.ATTACHMENT)):
         if isinstance(item, Metadata):
             log.metadata[item.name] = item.metadata
         elif isinstance(item, Attachment):
             log.attachments[item.name] = item.data
-        else:
-            break  # they stand at the beginning
     return log

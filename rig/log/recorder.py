@@ -16,7 +16,7 @@ from mcap.exceptions import McapError
 
 from drivers.clock import Clock
 from rig.log.encode import Encoder
-from rig.log.entry import Entry, Happened, Picture
+from rig.log.entry import Attached, Entry, Happened, Picture
 from rig.log.mcap_file import McapFile
 from rig.realtime import step_back
 
@@ -118,7 +118,11 @@ class Recorder:
 
     def _work(self) -> None:
         step_back()
-        self._guarded(self._serve)
+        try:
+            self._guarded(self._serve)
+        except BaseException as error:  # a mistake in this program: nobody must wait for the thread
+            self._fail(repr(error))
+            raise
 
     def _serve(self) -> None:
         while not self._closing.wait(_EVERY_S):
@@ -132,6 +136,9 @@ class Recorder:
         while self._waiting:
             logged_s, entry = self._waiting.popleft()
             logged_ns = self._encoder.ns(logged_s)
+            if isinstance(entry, Attached):
+                self._file.attach(entry.name, entry.data, logged_ns)
+                continue
             for message in self._encoder.messages(entry):
                 self._file.write(message, logged_ns)
             if isinstance(entry, Picture):

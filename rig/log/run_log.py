@@ -1,6 +1,7 @@
 """What the control loop writes to: one call a record, none of which waits for a disk."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,7 +13,7 @@ from drivers.errors import ConfigError
 from drivers.interfaces import ArmState
 from estimator.estimate import Estimate
 from rig.log.encode import Encoder
-from rig.log.entry import Commanded, Estimated, Happened, Picture, Seen, States, Ticked
+from rig.log.entry import Attached, Commanded, Estimated, Happened, Picture, Seen, States, Ticked
 from rig.log.header import LogHeader, attachments_of, metadata_of
 from rig.log.mcap_file import McapFile
 from rig.log.recorder import Recorded, Recorder, warn_on_stderr
@@ -85,6 +86,11 @@ class RunLog:
         """Something that happened: started, target lost, stopped, …"""
         self._recorder.put(Happened(t_s, name, detail), self._clock.now_s())
 
+    def attach(self, path: Path) -> None:
+        """A file that came of what was recorded; one that cannot be read is left out."""
+        with suppress(OSError):
+            self._recorder.put(Attached(path.name, path.read_bytes()), self._clock.now_s())
+
 
 def open_run_log(
     run_dir: Path,
@@ -93,7 +99,14 @@ def open_run_log(
     warn: Callable[[str], None] = warn_on_stderr,
 ) -> RunLog:
     """Begin ``log.mcap`` in the run directory; raises ConfigError when it cannot be written."""
-    path, images = run_dir / LOG_NAME, header.config.log
+    return open_log_file(run_dir / LOG_NAME, header, clock, warn)
+
+
+def open_log_file(
+    path: Path, header: LogHeader, clock: Clock, warn: Callable[[str], None] = warn_on_stderr
+) -> RunLog:
+    """Begin a log; raises ConfigError when it cannot be written."""
+    images = header.config.log
     encoder = Encoder(images, header.intrinsics, header.T_tool_camera, header.offset_ns)
     now_ns = encoder.ns(clock.now_s())
     try:
@@ -106,4 +119,4 @@ def open_run_log(
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error}") from error
     recorder = Recorder(file, encoder, clock if header.realtime else None, warn)
-    return RunLog(recorder, clock, images.images != "off")
+    return RunLog(recorder, clock, images.images != "off" and header.pictures)

@@ -61,6 +61,9 @@ _ESTIMATE = _object(
     chi={**_NUMBER, "description": "1/R, 1/m"},
     radius_m=_NUMBER,
     variance={**_NUMBER, "description": "of chi"},
+    covariance={**_array(4, 4, optional=True), "description": "of (s, chi), updates only"},
+    image_covariance={**_array(3, 3, optional=True), "description": "of s in the image"},
+    doubt={**_TEXT, "description": "why images and motion contradict each other, or empty"},
     residual=_NUMBER,
     extrapolated_s=_NUMBER,
 )

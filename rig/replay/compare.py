@@ -30,6 +30,11 @@ def _same(one: Estimate, other: Estimate) -> bool:
         return False
     if one.axis is not None and other.axis is not None and not _equal(one.axis, other.axis):
         return False
+    if one.doubt != other.doubt:
+        return False
+    # Recorded of updates only: a prediction's follow from them.
+    if one.covariance is not None and not _equal(one.covariance, other.covariance):
+        return False
     return _equal(_numbers(one), _numbers(other))
 
 
@@ -39,5 +44,5 @@ def _numbers(estimate: Estimate) -> np.ndarray:
     return np.array([*numbers, *estimate.s])
 
 
-def _equal(one: np.ndarray, other: np.ndarray) -> bool:
-    return bool(np.array_equal(one, other, equal_nan=True))
+def _equal(one: np.ndarray, other: np.ndarray | None) -> bool:
+    return other is not None and bool(np.array_equal(one, other, equal_nan=True))

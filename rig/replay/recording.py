@@ -211,7 +211,14 @@ def _estimate(values: dict[str, Any]) -> Estimate:
         variance=values.get("variance"),
         residual=numbers["residual"],
         extrapolated_s=numbers["extrapolated_s"],
+        covariance=_matrix(values, "covariance"),
+        image_covariance=_matrix(values, "image_covariance"),
+        doubt=values.get("doubt", ""),
     )
+
+
+def _matrix(values: dict[str, Any], name: str) -> FloatArray | None:
+    return None if values.get(name) is None else np.array(values[name], dtype=float)
 
 
 def _number(value: float | None) -> float:

@@ -20,6 +20,7 @@ _ALWAYS = (
     "calibration.tool_camera_xyz_m",
     "calibration.tool_camera_rotvec_rad",
     "run.converged_fraction",
+    "run.until_share",
 )
 _FROM_IMAGES = ("camera.method", "calibration.intrinsics")
 

@@ -2,13 +2,17 @@
 
 import json
 import os
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
+from rig.log.lines import lines
+from rig.log.reader import open_log
 from tests.rig.command_line import Outcome, rig
 
 SMALL = [
@@ -101,6 +105,25 @@ def test_an_interrupted_calibration_goes_on_with_what_it_has(folder: Path) -> No
     done = calibrate("latency", settings=TRUTH)
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout)["stamp_late_s"] == pytest.approx(0.075, abs=2e-4)
+
+
+def test_what_a_calibration_saw_and_did_is_recorded(folder: Path) -> None:
+    data = folder / "calibration" / "sim-data"
+    log = open_log(data / "log-all.mcap")
+    assert log.finished
+    assert yaml.safe_load(log.attachments["sim.yaml"])["verdict"]["passed"]
+    assert yaml.safe_load(log.attachments["config.yaml"])["sim"]["camera"]["fx"] == 775
+    counts = Counter(record.kind for record in log.records())
+    assert counts["image"] == counts["frame"] > 100
+    assert counts["arm"] > 1000 and counts["command"] > 500
+    events = [line["event"] for line in lines(log) if line["kind"] == "event"]
+    for step in ("poses", "fit", "latency", "verification"):
+        assert f"step {step}" in events
+    stamps_ns = {record.t_ns for record in log.records(["image"])}
+    with np.load(data / "still-003.npz") as still:
+        assert round(still["stamps"][0] * 1e9) in stamps_ns
+    replayed = rig("replay", str(data / "log-all.mcap"))
+    assert replayed.exit_code == 2 and "'board'" in replayed.stderr
 
 
 @pytest.mark.parametrize(
