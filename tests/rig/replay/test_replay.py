@@ -76,6 +76,25 @@ def test_another_gain_gives_what_a_run_with_it_would_have_given(
     assert abs(chi[-1] - runs[2000].data.updates[-1].chi) > 1.0
 
 
+def test_an_estimator_that_states_its_uncertainty_is_repeated_with_it(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=1", "estimator.kind=kalman"])
+    bench.run()
+    done = replay(open_recording(tmp_path))
+    assert first_difference(done.recorded, done.replayed) == ""
+    recorded, live = done.recorded.updates[-1], bench.data.updates[-1]
+    assert recorded.covariance is not None and live.covariance is not None
+    np.testing.assert_array_equal(recorded.covariance, live.covariance)
+    recorded.covariance[0, 0] *= 1.0 + 1e-15
+    assert "update" in first_difference(done.recorded, done.replayed)
+
+
+def test_another_estimator_answers_on_the_same_recording(bench: Bench) -> None:
+    done = replay(open_recording(bench.run_dir), ["estimator.kind=kalman"])
+    assert done.summary["radius_std_m"] is not None
+    assert done.summary["radius_m"] == pytest.approx(RADIUS_M, rel=1e-3)
+    assert done.summary["radius_m"] != bench.data.updates[-1].radius_m
+
+
 def test_a_wrong_latency_shows_in_the_radius(bench: Bench) -> None:
     radii = [
         replay(open_recording(bench.run_dir), settings).summary["radius_m"]
