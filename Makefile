@@ -31,6 +31,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.bench_limb
 	$(BIN)/python -m benchmarks.bench_sim
 	$(BIN)/python -m benchmarks.bench_run
+	$(BIN)/python -m benchmarks.bench_log
 	$(BIN)/python -m benchmarks.bench_camera
 	$(BIN)/python -m benchmarks.bench_ur
 	$(BIN)/python -m benchmarks.bench_grbl
