@@ -31,7 +31,7 @@ def _indexed(log: Log, kind: str, logged_ns: int, t_ns: int) -> GreyImage:
     try:
         with log.path.open("rb") as file:
             found = make_reader(file).iter_messages(
-                [topic.name], start_time=logged_ns, end_time=logged_ns + 1
+                [topic.name], starting_at=logged_ns, ending_at=logged_ns
             )
             for _, _, message in found:
                 if message.publish_time == t_ns:

@@ -11,6 +11,7 @@ import pytest
 from tests.rig.browser import new_page
 from tests.rig.page.watched_run import watched_run
 
+pytestmark = pytest.mark.realtime
 pytest.importorskip("viser", reason="needs the package viser")
 
 STOP = "button:has(.icon-tabler-hand-stop)"

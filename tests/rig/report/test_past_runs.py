@@ -40,10 +40,21 @@ def test_a_record_holds_what_the_run_held(recorded: Path) -> None:
     assert run.setup.radius_true_m == run.summary["radius_true_m"]
     assert run.events[0].name == "started"
     assert run.start_s == run.data.updates[0].t_s
-    newest = run.pictures[-1]
-    assert newest.t_s == run.data.updates[-1].t_s
+    assert len(run.pictures) == len(run.frames)
+    newest = next(p for p in run.pictures if p.t_s == run.data.updates[-1].t_s)
     assert newest.load().shape == (480, 640)
     assert newest.feature is not None and newest.feature.s.shape == (3,)
+    assert not np.array_equal(newest.load(), run.pictures[0].load())
+
+
+def test_an_image_is_the_same_with_and_without_an_index(recorded: Path, tmp_path: Path) -> None:
+    run_dir = copy_of(recorded, tmp_path / "killed")
+    log = log_bytes(recorded)
+    (run_dir / LOG_NAME).write_bytes(log[: len(log) // 2])
+    found, searched = read_run(recorded), read_run(run_dir)
+    assert 0 < len(searched.pictures) < len(found.pictures)
+    for number in (0, len(searched.pictures) - 1):
+        assert np.array_equal(found.pictures[number].load(), searched.pictures[number].load())
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])

@@ -29,7 +29,7 @@ def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> No
     assert rig("report", *runs, "--out", str(both)).exit_code == 0
     assert (both / "report.png").stat().st_size > 10_000
     requests = []
-    with new_page() as page:
+    with new_page(640, 480) as page:
         page.on("request", lambda request: requests.append(request.url))
         page.goto((both / "report.html").as_uri())
         page.wait_for_selector("body[data-drawn]")
