@@ -242,8 +242,6 @@ def test_an_estimate_that_images_contradict_stops_the_run(tmp_path: Path) -> Non
 
 
 def test_a_camera_that_pauses_is_waited_for(tmp_path: Path) -> None:
-    bench = make_bench(tmp_path, ["run.duration_s=5"])
-    bench.vision.frozen_from_s = 2.0
     resumed = False
 
     def resume(status: LiveStatus) -> None:
@@ -252,7 +250,8 @@ def test_a_camera_that_pauses_is_waited_for(tmp_path: Path) -> None:
             resumed, bench.vision.frozen_from_s = True, np.inf
             bench.vision.seq = int(bench.clock.now_s() * 30)
 
-    bench.loop._on_tick = resume
+    bench = make_bench(tmp_path, ["run.duration_s=5"], on_tick=resume)
+    bench.vision.frozen_from_s = 2.0
     outcome = bench.run()
     assert outcome.ending is Ending.TIME
     assert outcome.holds == 1

@@ -70,7 +70,7 @@ def test_states_survive_the_journey() -> None:
     sent = state_of(status(7, variance=0.04), status(7).sighting, 33.0, image=3)
     assert state_of_bytes(sent.to_bytes()) == sent
     assert sent.radius_m == 0.025
-    assert sent.spread_stated and sent.spread_m == pytest.approx(0.2 * 0.025**2)
+    assert sent.spread_stated and sent.spread_m == pytest.approx(0.2 * 0.025**2, rel=1e-3)
     assert sent.feature is not None and sent.feature.s.tolist() == [0.0, 0.0, 15.0]
     judged = state_of(status(7), None, 30.0, image=None)
     assert not judged.spread_stated
