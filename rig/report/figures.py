@@ -26,7 +26,10 @@ Figure = dict[str, Json]
 
 
 def figures(runs: Sequence[Shown]) -> dict[str, Figure]:
-    """Every figure by the name of its place on the page; several runs lie over each other."""
+    """Every figure by the name of its place on the page; several runs lie over each other.
+
+    A figure that none of the runs has anything for is left out.
+    """
     builders: dict[str, Callable[[Sequence[Shown]], Figure]] = {
         "radius": _radius,
         "path": path_figure,
@@ -40,7 +43,8 @@ def figures(runs: Sequence[Shown]) -> dict[str, Figure]:
         "latency": latency_figure,
         "lateness": lateness_figure,
     }
-    return {name: build(runs) for name, build in builders.items()}
+    built = {name: build(runs) for name, build in builders.items()}
+    return {name: figure for name, figure in built.items() if figure["data"]}
 
 
 def _radius(runs: Sequence[Shown]) -> Figure:
@@ -49,6 +53,7 @@ def _radius(runs: Sequence[Shown]) -> Figure:
     finals = []
     for run in runs:
         analysis = run.analysis
+        data += _stated_band(run)
         data.append(curve(run, analysis.t_s, 1e3 * analysis.radius_m, unit="mm"))
         if len(analysis.radius_m):
             finals.append(1e3 * float(analysis.radius_m[-1]))
@@ -63,6 +68,23 @@ def _radius(runs: Sequence[Shown]) -> Figure:
     # The same line once, however many runs have that radius.
     unique = {str(shape): shape for shape in shapes}
     return {"data": data, "layout": {**out, "shapes": list(unique.values())}}
+
+
+def _stated_band(run: Shown) -> list[Json]:
+    """R̂ with χ̂ taken two standard deviations up and down, where the estimator states them."""
+    analysis = run.analysis
+    if analysis.chi_std is None:
+        return []
+    out: list[Json] = []
+    for sign, fill in ((1.0, None), (-1.0, "tonexty")):
+        chi = analysis.chi + sign * 2.0 * analysis.chi_std
+        with np.errstate(divide="ignore"):
+            radius_m = np.where(chi > 0.0, 1.0 / chi, np.nan)
+        line = curve(run, analysis.t_s, 1e3 * radius_m, unit="mm", name=f"{run.name}: ± 2 σ")
+        edge: dict[str, Json] = {"color": run.colour, "width": 0}
+        shade: dict[str, Json] = {"fill": fill, "fillcolor": f"{run.colour}33"} if fill else {}
+        out.append({**line, "line": edge, "showlegend": False, **shade})
+    return out
 
 
 def _axis(out: dict[str, Json]) -> dict[str, Json]:

@@ -12,6 +12,7 @@ FIGURES = {
     *("radius", "path", "transient", "deviation", "residual", "sigma2", "speed2", "speed"),
     *("events", "lateness", "latency"),
 }
+OBSERVER = ("--set", "estimator.kind=observer")
 DRAWN = """() => Object.fromEntries([...document.querySelectorAll('.plot')].map(div => [div.id,
   div.data.map(trace => trace.type).concat(
     div.querySelector('canvas, .trace, .point') ? [] : ['nothing drawn'])]))"""
@@ -19,8 +20,8 @@ DRAWN = """() => Object.fromEntries([...document.querySelectorAll('.plot')].map(
 
 def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> None:
     summaries = [
-        record(tmp_path / "a", "--set", "sim.camera.drop_probability=0.2"),
-        record(tmp_path / "b", "--set", "estimator.alpha=8000", "--no-report"),
+        record(tmp_path / "a", *OBSERVER, "--set", "sim.camera.drop_probability=0.2"),
+        record(tmp_path / "b", *OBSERVER, "--set", "estimator.alpha=8000", "--no-report"),
     ]
     assert (tmp_path / "a" / "report.html").is_file()
     assert not (tmp_path / "b" / "report.html").exists()
@@ -51,3 +52,13 @@ def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> No
     assert len(images) >= 6 and set(images) == {640}
     log = log_lines(tmp_path / "a")
     assert len(times) == len([entry for entry in log if entry["kind"] == "event"])
+
+
+def test_what_no_run_has_anything_for_is_left_out(tmp_path: Path) -> None:
+    summary = record(tmp_path / "run", "--set", "estimator.kind=kalman")
+    page = (tmp_path / "run" / "report.html").read_text()
+    figures = json.loads(page.rpartition("const figures = ")[2].partition(";\n")[0])
+    assert set(figures) == FIGURES - {"deviation"}  # only the observer promises a response
+    bounds = figures["radius"]["data"][:2]
+    assert [len(bound["y"]) for bound in bounds] == [len(figures["radius"]["data"][2]["y"])] * 2
+    assert f"{1e3 * summary['radius_std_m']:.4f}" in page
