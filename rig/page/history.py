@@ -11,6 +11,7 @@ FloatArray = NDArray[np.float64]
 
 _SPAN_S = 60.0
 _EVERY_S = 0.1
+_COLUMNS = 7
 
 
 class History:
@@ -49,21 +50,22 @@ class History:
         self._before, self._latest_ms = state, 0.0
 
     def radius(self) -> tuple[FloatArray, ...]:
-        """t [s]; R̂ − σ, R̂ + σ, R̂ [mm], in the order they are drawn over each other; each (n,)."""
-        return self._columns(0, 2, 3, 1)
+        """t [s]; R̂ − σ, R̂ + σ, R̂ [mm], in the order they are drawn over each other; each (n,).
+
+        From the first estimate on: a plot with gaps at its beginning finds no scale.
+        """
+        return self._columns([row for row in self._rows if np.isfinite(row[1])], 0, 2, 3, 1)
 
     def health(self) -> tuple[FloatArray, ...]:
         """t [s], greatest lateness [ms], ticks missed; each (n,)."""
-        return self._columns(0, 4, 6)
+        return self._columns(list(self._rows), 0, 4, 6)
 
     @property
     def rate_hz(self) -> float | None:
         """The loop's rate over the last row; None before there is one."""
         return self._rows[-1][5] if self._rows and np.isfinite(self._rows[-1][5]) else None
 
-    def _columns(self, *which: int) -> tuple[FloatArray, ...]:
-        rows = np.array(self._rows).reshape(-1, 7)
-        if len(rows) == 0:
-            rows = np.full((1, 7), np.nan)
-            rows[:, 0] = 0.0
-        return tuple(rows[:, column] for column in which)
+    @staticmethod
+    def _columns(rows: list[tuple[float, ...]], *which: int) -> tuple[FloatArray, ...]:
+        table = np.array(rows or [(0.0,) * _COLUMNS])
+        return tuple(table[:, column] for column in which)

@@ -98,7 +98,7 @@ class Scene:
     def _lines(self, name: str, colour: Colour) -> viser.LineSegmentsHandle:
         nothing = np.zeros((1, 2, 3), dtype=np.float32)
         return self._scene.add_line_segments(
-            name, nothing, colour, thickness=2.5, thickness_units="screen"
+            name, nothing, colour, thickness=3.0, thickness_units="screen"
         )
 
     def _shape(
@@ -124,8 +124,8 @@ class Scene:
         if len(self._path) > 1 and len(self._path) != self._drawn_path and due:
             points = np.array(self._path, dtype=np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
+            self._path_lines.colors = np.full(segments.shape, _PATH, np.uint8)
             self._path_lines.points = segments
-            self._path_lines.colors = np.broadcast_to(np.array(_PATH, np.uint8), segments.shape)
             self._drawn_path, self._path_at_s = len(self._path), elapsed_s
 
     def _draw_target(self, state: PageState, T_base_camera: FloatArray) -> None:
@@ -151,8 +151,8 @@ class Scene:
         """Look at target and camera from the side."""
         self._aimed = True
         middle = 0.5 * (target_m + camera_m)
-        distance_m = 1.6 * float(np.linalg.norm(camera_m - target_m)) + 0.3
-        eye = middle + distance_m * np.array([0.6, -0.75, 0.3])
+        distance_m = 1.3 * float(np.linalg.norm(camera_m - target_m)) + 0.2
+        eye = middle + distance_m * np.array([0.6, -0.75, 0.25])
         initial = self._server.initial_camera
         initial.position, initial.look_at = tuple(eye), tuple(middle)
         for client in self._server.get_clients().values():
