@@ -18,7 +18,10 @@ TargetKind = Literal["sphere", "cylinder"]
 class EstimatorConfig(Section):
     """Which estimator, its first guess, and what it needs to know."""
 
-    kind: Literal["observer", "kalman", "batch", "triangulation"] = "observer"
+    # The last four are there to compare with.
+    kind: Literal[
+        "observer", "kalman", "batch", "triangulation", "limb_plane", "limb_plane_ekf"
+    ] = "observer"
     # Of the observer.
     alpha: Annotated[float, Field(gt=0, le=1e6)] = 2000.0
     damping: Annotated[float, Field(gt=0, le=20)] = 1.0  # multiple of c* = 2 sqrt(alpha) sigma
@@ -42,7 +45,7 @@ class EstimatorConfig(Section):
     @property
     def states_variance(self) -> bool:
         """Whether the chosen estimator says how sure it is."""
-        return self.kind in ("kalman", "batch")
+        return self.kind in ("kalman", "batch", "limb_plane_ekf")
 
     @property
     def radius_range(self) -> tuple[float, float]:

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.clock import Clock, WallClock, local_timestamp, time_of_day_offset_ns
+from drivers.errors import ConfigError
 from estimator.active.circle import CircularVelocity
 from estimator.active.controller import Controller
 from estimator.active.information_policy import InformationPolicy, Walls
 from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.batch import BatchLeastSquares
 from estimator.estimate import Estimator
+from estimator.extended import ExtendedKalmanFilter
 from estimator.image.intrinsics import Intrinsics
 from estimator.kalman import KalmanFilter, RadiusPrior, TwistNoise
 from estimator.models.cylinder import Cylinder
+from estimator.models.limb_plane import LimbPlane
+from estimator.models.model import Model
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
 from estimator.triangulation import Triangulation
@@ -183,17 +187,23 @@ def _of_log(recorded: Recorded) -> dict[str, Json]:
 
 
 def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
-    """The estimator that the configuration asks for."""
-    model = Sphere() if target == "sphere" else Cylinder()
-    estimator = config.estimator
-    if estimator.kind == "observer":
-        return Observer(model, estimator.alpha, estimator.damping, estimator.radius_guess_m)
-    if estimator.kind == "triangulation":
-        return Triangulation(model, estimator.radius_guess_m)
-    prior = RadiusPrior(estimator.radius_guess_m, *estimator.radius_range)
-    if estimator.kind == "batch":
+    """The estimator that the configuration asks for; ConfigError where the target has none such."""
+    chosen = config.estimator
+    model: Model = Sphere() if target == "sphere" else Cylinder()
+    if chosen.kind in ("limb_plane", "limb_plane_ekf"):
+        if target != "sphere":
+            raise ConfigError(f"estimator.kind = {chosen.kind} is for spheres: choose another")
+        model = LimbPlane()
+    if chosen.kind in ("observer", "limb_plane"):
+        return Observer(model, chosen.alpha, chosen.damping, chosen.radius_guess_m)
+    if chosen.kind == "triangulation":
+        return Triangulation(model, chosen.radius_guess_m)
+    prior = RadiusPrior(chosen.radius_guess_m, *chosen.radius_range)
+    if chosen.kind == "batch":
         return BatchLeastSquares(model, prior)
-    noise = TwistNoise(estimator.twist_std_m_s, estimator.twist_std_rad_s)
+    noise = TwistNoise(chosen.twist_std_m_s, chosen.twist_std_rad_s)
+    if chosen.kind == "limb_plane_ekf":
+        return ExtendedKalmanFilter(model, prior, noise)
     return KalmanFilter(model, prior, noise)
 
 

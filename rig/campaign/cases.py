@@ -7,7 +7,9 @@ from typing import Literal, get_args
 
 from rig.config import TargetKind
 
-EstimatorKind = Literal["observer", "kalman", "batch", "triangulation"]
+EstimatorKind = Literal[
+    "observer", "kalman", "batch", "triangulation", "limb_plane", "limb_plane_ekf"
+]
 PolicyKind = Literal["constant", "paper", "information", "circle"]
 NoiseKind = Literal["clean", "hard", "laggy", "lossy"]
 

@@ -19,6 +19,8 @@ _COLOURS = {
     "kalman": "#c62828",
     "batch": "#2e7d32",
     "triangulation": "#8a6d00",
+    "limb_plane": "#6a3d9a",
+    "limb_plane_ekf": "#e0771b",
 }
 
 

@@ -18,7 +18,8 @@ _WIDTH = 132
 def compare(
     target: Target,
     estimators: Annotated[
-        str, typer.Option(help="Of observer, kalman, batch, triangulation.")
+        str,
+        typer.Option(help="Of observer, kalman, batch, triangulation, limb_plane, limb_plane_ekf."),
     ] = "observer,kalman",
     policies: Annotated[
         str, typer.Option(help="Of constant, paper, information, circle.")
