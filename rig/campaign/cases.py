@@ -19,9 +19,9 @@ CONDITIONS: dict[NoiseKind, tuple[str, ...]] = {
     "hard": (
         "sim.features.noise_px=0.02",
         "sim.camera.noise_grey=5",
-        "sim.camera.exposure_s=0.012",
-        "sim.light.ambient=0.35",
-        "sim.background.high_grey=90",
+        "sim.camera.exposure_s=0.02",
+        "sim.light.ambient=0.5",
+        "sim.background.high_grey=70",
     ),
     "laggy": (
         "sim.camera.latency_s=0.12",
