@@ -4,7 +4,8 @@ RigError
 ├── ConfigError (ValueError)            the configuration is wrong; nothing was opened
 ├── ConnectError (ConnectionError)      a device could not be opened or set up
 ├── OperateError                        a device failed while in use
-│   └── DeviceTimeoutError (TimeoutError)   it did not answer or deliver in time
+│   ├── DeviceTimeoutError (TimeoutError)   it did not answer or deliver in time
+│   └── MotionRefusedError              it is well but cannot make this motion
 └── SafetyError                         motion was refused or stopped to stay safe
 
 A message says what happened, to which device, and what to do next. Vendor exceptions are
@@ -30,6 +31,10 @@ class OperateError(RigError):
 
 class DeviceTimeoutError(OperateError, TimeoutError):
     """A device did not answer or deliver within its time limit."""
+
+
+class MotionRefusedError(OperateError):
+    """The arm is well and at rest, but cannot make the motion that was commanded."""
 
 
 class SafetyError(RigError):

@@ -31,6 +31,9 @@ _REMOTE_CAMERA = "rig.build_sim:build_remote_camera"
 _CAMERAS = {"opencv": "drivers.camera.open:open_camera"}
 _ARMS = {"ur": "drivers.ur.arm:UrArm", "grbl": "drivers.grbl.arm:GrblArm"}
 
+# Arms that have a pendant or can be led by hand: listened to without taking control.
+_LISTENERS = {"ur": "drivers.ur.listener:UrListener"}
+
 
 class Truth(Protocol):
     """What a simulated rig knows and a real one does not; for error figures only."""
@@ -124,6 +127,17 @@ def open_camera(config: CameraConfig, clock: Clock) -> Camera:
 def open_arm(config: ArmConfig, clock: Clock) -> Arm:
     """A real arm; raises ConnectError when it cannot be opened."""
     arm_of = cast(Callable[[object, Clock], Arm], load_entry(_ARMS[config.driver]))
+    return arm_of(config, clock)
+
+
+def open_listener(config: ArmConfig, clock: Clock) -> Arm | None:
+    """A real arm that is only listened to; None for one that cannot be moved otherwise.
+
+    Raises ConnectError when it cannot be opened.
+    """
+    if config.driver not in _LISTENERS:
+        return None
+    arm_of = cast(Callable[[object, Clock], Arm], load_entry(_LISTENERS[config.driver]))
     return arm_of(config, clock)
 
 

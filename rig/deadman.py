@@ -29,6 +29,10 @@ class Deadman:
         self._fed_s = self._clock.now_s()
         self._armed = True
 
+    def rest(self) -> None:
+        """The arm was seen at rest and its last command was to stay so: nothing to guard."""
+        self._armed = False
+
     def close(self) -> None:
         """End the thread; the arm is stopped by other hands from here on."""
         self._ending.set()

@@ -2,6 +2,8 @@
 
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -29,6 +31,7 @@ class StopRequest:
         self._clock: Clock = WallClock() if clock is None else clock
         self._received = 0
         self._asked = False
+        self._at_once = False
         self._first_s = 0.0
         self._previous: dict[int, object] = {}
 
@@ -36,6 +39,20 @@ class StopRequest:
         """Whether a stop was asked for."""
         self._asked = True
         return self._received > 0 or reader_is_gone()
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """While nothing moves and nothing is written: a signal raises KeyboardInterrupt at once.
+
+        So does one that came before. For long calculations, which ask for no flag.
+        """
+        self._at_once = True
+        try:
+            if self._received:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._at_once = False
 
     def __enter__(self) -> Self:
         for number in _SIGNALS:
@@ -57,5 +74,5 @@ class StopRequest:
             self._first_s = self._clock.now_s()
             print(f"\n{self._notice}", file=sys.stderr, flush=True)
         patient = self._clock.now_s() <= self._first_s + _PATIENCE_S
-        if not self._asked or (self._received >= _INSISTING and not patient):
+        if not self._asked or self._at_once or (self._received >= _INSISTING and not patient):
             raise KeyboardInterrupt

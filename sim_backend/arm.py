@@ -65,7 +65,7 @@ class SimulatedArm:
         """The joints at the newest reported sample; None before the first."""
         if self._q is None:
             return None
-        return Joints(_JOINT_NAMES, self._q, JOINT_LOW, JOINT_HIGH, _LINEAR, tool_jacobian)
+        return joints_at(self._q)
 
     def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
         """Follow ``twist_tool`` (6,), held in the tool's own axes, for ``hold_s`` from now.
@@ -92,6 +92,11 @@ class SimulatedArm:
         """Stop; later commands are refused."""
         self.stop()
         self._closed = True
+
+
+def joints_at(q: FloatArray) -> Joints:
+    """The gantry's joints at ``q`` (6,)."""
+    return Joints(_JOINT_NAMES, q, JOINT_LOW, JOINT_HIGH, _LINEAR, tool_jacobian)
 
 
 @jit

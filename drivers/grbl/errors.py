@@ -7,13 +7,13 @@ OperateError
 │   ├── ResetError         the controller restarted
 │   ├── NotReadyError      found locked or held so that it cannot even be asked about itself
 │   ├── RefusedError       it answered error:<code>
-│   ├── LimitError         the motion leads out of a joint's range
-│   ├── MotionError        a motion this gantry cannot make, or a command that is none
+│   ├── LimitError         the motion leads out of a joint's range (a MotionRefusedError too)
+│   ├── MotionError        a motion this gantry cannot make, or a command that is none (the same)
 │   └── PortLostError      the serial port is gone
 └── SilentError            the port is there, the controller does not answer
 """
 
-from drivers.errors import DeviceTimeoutError, OperateError
+from drivers.errors import DeviceTimeoutError, MotionRefusedError, OperateError
 from drivers.grbl.protocol import Status
 
 
@@ -45,11 +45,11 @@ class RefusedError(GantryError):
     """The controller refused a line."""
 
 
-class LimitError(GantryError):
+class LimitError(GantryError, MotionRefusedError):
     """The motion leads out of a joint's range."""
 
 
-class MotionError(GantryError):
+class MotionError(GantryError, MotionRefusedError):
     """The command is not a motion that this gantry can make."""
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.calibration import se3
-from rig.calibration.errors import CalibrationError
+from rig.calibration.errors import CalibrationError, ScaleError
 from rig.calibration.hand_eye_model import Noise
 
 FloatArray = NDArray[np.float64]
@@ -39,10 +39,10 @@ def check_rotations(T_base_tool: FloatArray) -> None:
 
 
 def check_scale(scale: float, std: float, square_m: float, tolerance: float) -> None:
-    """Raise CalibrationError when the arm's motion contradicts the size of the board."""
+    """Raise ScaleError when the arm's motion contradicts the size of the board."""
     off = abs(scale - 1.0)
     if off > tolerance and off > _SCALE_SIGMAS * std:
-        raise CalibrationError(
+        raise ScaleError(
             f"the arm's motion contradicts the board's size by the ratio {scale:.4f} ± {std:.4f}: "
             f"a square would measure {1e3 * scale * square_m:.2f} mm, the board's definition says "
             f"{1e3 * square_m:.2f} mm. Measure the print and correct the definition; if the print "

@@ -43,6 +43,8 @@ class IntrinsicsResult(Section):
     distortion: Five
     std: IntrinsicsStd
     obtained: str  # how, in words
+    # From pictures alone: hand-eye then takes these values as known before.
+    from_images: bool = False
     fit_px: NotNegative  # rms distance of the corners
     held_out_px: NotNegative  # the same on images the fit had not seen
     coverage: NotNegative  # share of the image's parts that held a corner

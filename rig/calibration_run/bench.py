@@ -1,5 +1,6 @@
 """The devices of a calibration: a camera that looks at the board, an arm, nominal values."""
 
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
@@ -10,8 +11,16 @@ from numpy.typing import NDArray
 from drivers.clock import Clock, WallClock
 from drivers.interfaces import Arm, Camera
 from estimator.image.intrinsics import Intrinsics
-from rig.build import given_geometry, is_simulated, open_arm, open_camera, open_simulated
+from rig.build import (
+    given_geometry,
+    is_simulated,
+    open_arm,
+    open_camera,
+    open_listener,
+    open_simulated,
+)
 from rig.config import RigConfig
+from rig.deadman import Deadman
 
 FloatArray = NDArray[np.float64]
 
@@ -25,6 +34,8 @@ class Bench:
     clock: Clock
     intrinsics: Intrinsics
     T_tool_camera: FloatArray  # (4, 4)
+    deadman: Deadman | None  # on the wall clock
+    moves: bool = True  # whether the arm takes commands; else somebody moves it by hand
 
     def __enter__(self) -> Self:
         return self
@@ -35,14 +46,14 @@ class Bench:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        try:
+        with closing(self.camera), ExitStack() as last:
+            if self.deadman is not None:
+                last.callback(self.deadman.close)
             self.arm.close()
-        finally:
-            self.camera.close()
 
 
-def open_bench(config: RigConfig, realtime: bool) -> Bench:
-    """Open camera and arm in front of the board.
+def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Bench:
+    """Open camera and arm in front of the board; ``by_hand``: an arm that can be led is not moved.
 
     Raises ConfigError when nominal values are missing or devices do not go together,
     ConnectError when one cannot be opened.
@@ -52,13 +63,21 @@ def open_bench(config: RigConfig, realtime: bool) -> Bench:
         assert devices.camera is not None  # it was asked for here, not in another process
         intrinsics, T_tool_camera = given_geometry(config, devices)
         devices.everything_ready()
-        return Bench(devices.camera, devices.arm, devices.clock, intrinsics, T_tool_camera)
+        deadman = _deadman(config, devices.clock, devices.arm) if realtime else None
+        return Bench(devices.camera, devices.arm, devices.clock, intrinsics, T_tool_camera, deadman)
     intrinsics, T_tool_camera = given_geometry(config, None)
     clock = WallClock()
     camera = open_camera(config.camera, clock)
     try:
-        arm = open_arm(config.arm, clock)
+        listener = open_listener(config.arm, clock) if by_hand else None
+        arm = open_arm(config.arm, clock) if listener is None else listener
     except BaseException:
         camera.close()
         raise
-    return Bench(camera, arm, clock, intrinsics, T_tool_camera)
+    deadman = _deadman(config, clock, arm) if listener is None else None
+    return Bench(camera, arm, clock, intrinsics, T_tool_camera, deadman, listener is None)
+
+
+def _deadman(config: RigConfig, clock: Clock, arm: Arm) -> Deadman:
+    """Guards the arm's motions, behind which driver and controller have limits of their own."""
+    return Deadman(clock, config.arm.hold_s, arm.stop)

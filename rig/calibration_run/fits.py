@@ -13,7 +13,10 @@ from rig.calibration.hand_eye_held_out import HeldOutError, held_out_error
 from rig.calibration.hand_eye_model import State
 from rig.calibration.intrinsics import IntrinsicsFit, fit_intrinsics
 from rig.calibration.latency import LatencyFit, fit_latency
+from rig.calibration.lens_model import FULL, MODELS
 from rig.calibration.projection import to_vector
+from rig.calibration.result import IntrinsicsResult
+from rig.calibration.result_make import intrinsics_of
 from rig.calibration.wiggle import Wiggle, WiggleVerdict, judge_wiggles
 from rig.calibration_run.recording import Recording
 from rig.calibration_run.stills import Still
@@ -52,13 +55,24 @@ def fit_lens(stills: Sequence[Still]) -> IntrinsicsFit:
 
 
 def fit_geometry(
-    stills: Sequence[Still], board: BoardConfig, settings: HandEyeSettings
+    stills: Sequence[Still],
+    board: BoardConfig,
+    settings: HandEyeSettings,
+    given: IntrinsicsResult | None = None,
 ) -> Geometry:
-    """Intrinsics and hand-eye from stills with arm poses; raises CalibrationError."""
-    lens = fit_lens(stills)
-    hand_eye = solve_hand_eye(
-        [still.view for still in stills], lens.intrinsics, lens.model, board.square_m, settings
-    )
+    """Intrinsics and hand-eye from stills with arm poses; raises CalibrationError.
+
+    ``given`` are intrinsics from other pictures, which count as known that well before.
+    """
+    lens, views = fit_lens(stills), [still.view for still in stills]
+    start, model, covariance = lens.intrinsics, lens.model, None
+    if given is not None:
+        own = given.std
+        std = np.array([own.fx_px, own.fy_px, own.cx_px, own.cy_px, *own.distortion])
+        fitted = tuple(bool(one > 0.0) for one in std[4:])
+        model = next((one for one in MODELS if one.coefficients == fitted), FULL)
+        start, covariance = intrinsics_of(given), np.diag(std**2)
+    hand_eye = solve_hand_eye(views, start, model, board.square_m, settings, covariance)
     return Geometry(lens, hand_eye)
 
 

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.errors import DeviceTimeoutError
-from drivers.interfaces import Arm, ArmState, JointArm
+from drivers.errors import DeviceTimeoutError, MotionRefusedError
+from drivers.interfaces import Arm, ArmState, JointArm, Joints
 from rig.calibration import se3
 from rig.calibration_run.errors import PoseRefusedError, StopRequestedError
+from rig.calibration_run.reach import Reach
 from rig.config_safety import SafetyConfig
-from rig.envelope import Surroundings
+from rig.deadman import Deadman
+from rig.envelope import Envelope, Surroundings
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
 
@@ -32,7 +34,8 @@ class Mover:
     """Drives one arm at a fraction of its envelope's speed and remembers all it reported.
 
     ``speed`` is that fraction. ``on_tick`` is called with the time of every tick, moving or
-    waiting, for whoever collects images meanwhile.
+    waiting, for whoever collects images meanwhile. With ``T_tool_camera`` (4, 4) the camera is
+    kept off the table too; on the wall clock a ``deadman`` guards every motion.
     """
 
     def __init__(
@@ -43,12 +46,16 @@ class Mover:
         hold_s: float,
         stop_requested: Callable[[], bool],
         speed: float = 0.7,
+        T_tool_camera: FloatArray | None = None,
+        deadman: Deadman | None = None,
     ) -> None:
         self._arm = arm
         self._joint_arm: JointArm | None = arm if isinstance(arm, JointArm) else None
         self._clock = clock
         self._safety = safety
-        self._limiter = Limiter(safety)
+        self._envelope = Envelope(safety, T_tool_camera)
+        self._limiter = Limiter(safety, self._envelope)
+        self._deadman = deadman
         self._hold_s = hold_s
         self._stop_requested = stop_requested
         self._speed = speed
@@ -60,6 +67,10 @@ class Mover:
     def T_base_tool(self) -> FloatArray:
         """The newest measured pose (4, 4)."""
         return self._newest().T_base_tool
+
+    def reach(self) -> Reach:
+        """Tells to which poses the way from here is free."""
+        return Reach(self._envelope, self._newest(), self._joints())
 
     def go_to(self, T_base_tool: FloatArray) -> None:
         """Move in a straight line to a pose (4, 4) and come to rest there.
@@ -90,13 +101,17 @@ class Mover:
                 f"{took_s:.1f} s: {why}"
             )
 
-    def follow(self, twist_of: Callable[[float], FloatArray], duration_s: float) -> None:
-        """Follow tool twists (6,), given by the time since the start; then come to rest.
+    def follow(
+        self, twist_of: Callable[[float, FloatArray], FloatArray], duration_s: float
+    ) -> None:
+        """Follow tool twists (6,), given by the time since the start and T_base_tool; then rest.
 
         Raises PoseRefusedError when the envelope blocks the motion, and StopRequestedError.
         """
         blocked = self._drive(
-            lambda elapsed_s, state: twist_of(elapsed_s) if elapsed_s < duration_s else None,
+            lambda elapsed_s, state: (
+                twist_of(elapsed_s, state.T_base_tool) if elapsed_s < duration_s else None
+            ),
             duration_s + 1.0,
         )
         self.settle()
@@ -121,6 +136,8 @@ class Mover:
             return None if settled else np.zeros(6)
 
         self._drive(rest, timeout_s)
+        if self._deadman is not None:
+            self._deadman.rest()  # detecting corners may take longer than a command lives
         if not np.isfinite(quiet_since_s):
             raise PoseRefusedError(f"the arm does not come to rest within {timeout_s:.0f} s")
         return float(quiet_since_s)
@@ -128,11 +145,27 @@ class Mover:
     def wait(self, duration_s: float) -> None:
         """Keep the arm at rest for a while; raises StopRequestedError."""
         self._drive(lambda elapsed, _: np.zeros(6) if elapsed < duration_s else None, np.inf)
+        if self._deadman is not None:
+            self._deadman.rest()
+
+    def check_stop(self) -> None:
+        """Raise StopRequestedError when somebody asked to stop."""
+        if self._stop_requested():
+            raise StopRequestedError("stopped on request; the arm is at rest")
 
     def _drive(
         self, wanted_of: Callable[[float, ArmState], FloatArray | None], patience_s: float
     ) -> str:
         """Command what ``wanted_of`` says until it says None; the barrier in the way, or ""."""
+        try:
+            return self._tick(wanted_of, patience_s)
+        except BaseException:
+            self._arm.stop()  # whatever happened: it is not to move on while that is sorted out
+            raise
+
+    def _tick(
+        self, wanted_of: Callable[[float, ArmState], FloatArray | None], patience_s: float
+    ) -> str:
         start_s = last_s = self._clock.now_s()
         for now_s in tick_grid(self._clock, _PERIOD_S, TickStats()):
             state = self._read(now_s)
@@ -144,7 +177,12 @@ class Mover:
             if now_s - last_s > self._hold_s:
                 self._limiter.restart()  # the last command has run out meanwhile
             allowed = self._limiter.limit(wanted, self._surroundings(state), dt_s)
-            self._arm.command_twist(allowed.twist_tool, self._hold_s)
+            try:
+                self._arm.command_twist(allowed.twist_tool, self._hold_s)
+            except MotionRefusedError as error:
+                return str(error)
+            if self._deadman is not None:
+                self._deadman.feed()
             if allowed.blocked:
                 return allowed.blocked
             last_s = now_s
@@ -154,9 +192,7 @@ class Mover:
         self.states += self._arm.read_states()
         state = self._newest()
         self._limiter.check_state(state, now_s)
-        if self._stop_requested():
-            self._arm.stop()
-            raise StopRequestedError("stopped on request; the arm was told to rest")
+        self.check_stop()
         return state
 
     def _newest(self) -> ArmState:
@@ -171,9 +207,10 @@ class Mover:
         return self.states[-1]
 
     def _surroundings(self, state: ArmState) -> Surroundings:
-        return Surroundings(
-            state, joints=None if self._joint_arm is None else self._joint_arm.joints()
-        )
+        return Surroundings(state, joints=self._joints())
+
+    def _joints(self) -> Joints | None:
+        return None if self._joint_arm is None else self._joint_arm.joints()
 
     def _way(self, T_base_tool: FloatArray) -> FloatArray:
         return se3.log(se3.inverse(self.T_base_tool) @ T_base_tool)

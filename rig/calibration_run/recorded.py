@@ -13,8 +13,7 @@ from drivers.clock import time_of_day_offset_ns
 from drivers.interfaces import Arm, ArmState, Camera, Frame, JointArm, Joints
 from estimator.image.feature import Measurement
 from rig.calibration_run.bench import Bench
-from rig.calibration_run.collector import PoseReport
-from rig.calibration_run.session import Progress
+from rig.calibration_run.watching import PoseReport, Progress
 from rig.config import RigConfig
 from rig.log.header import LogHeader
 from rig.log.run_log import RunLog, open_log_file
@@ -120,10 +119,19 @@ class RecordedProgress:
         self._log = log
         self._clock = bench.clock
 
-    def step(self, name: str, detail: str) -> None:
+    def step(self, name: str, detail: str, total: float | None = None) -> None:
         """A step begins."""
         self._log.event(self._clock.now_s(), f"step {name}", detail)
-        self._progress.step(name, detail)
+        self._progress.step(name, detail, total)
+
+    def done(self, count: float) -> None:
+        """So much of the step is done; too often to be logged."""
+        self._progress.done(count)
+
+    def note(self, text: str) -> None:
+        """Something worth a line."""
+        self._log.event(self._clock.now_s(), "note", text)
+        self._progress.note(text)
 
     def pose(self, report: PoseReport) -> None:
         """A pose was looked from, or skipped."""

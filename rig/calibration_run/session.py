@@ -2,21 +2,18 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.clock import local_timestamp
 from drivers.interfaces import GreyImage
-from rig.calibration import se3
 from rig.calibration.board import corner_points
 from rig.calibration.detection import BoardDetector, Detection
 from rig.calibration.errors import CalibrationError
 from rig.calibration.excitation import Excitation
 from rig.calibration.latency import LatencyFit
 from rig.calibration.pose_candidates import Scene
-from rig.calibration.pose_planning import plan_poses, tour
+from rig.calibration.pose_planning import plan_poses
 from rig.calibration.projection import to_vector
 from rig.calibration.result import CalibrationFile, Fingerprints, save_calibration
 from rig.calibration.result_check import judge
@@ -27,32 +24,21 @@ from rig.calibration.result_make import (
     verification_result,
 )
 from rig.calibration.views import BoardView
-from rig.calibration.wiggle import Wiggle, wiggle_steps
 from rig.calibration_run.bench import Bench
-from rig.calibration_run.collector import Collector, PoseReport, nominal_state
-from rig.calibration_run.errors import PoseRefusedError
+from rig.calibration_run.by_hand import ByHand, Glance, KeySource
+from rig.calibration_run.checking import SMALL_MOTIONS, fresh_stills, small_motions
+from rig.calibration_run.collector import Collector, nominal_state, within_safety
 from rig.calibration_run.fits import Geometry, Verification, fit_delay, fit_geometry, verify
+from rig.calibration_run.hand_jog import HandJog
 from rig.calibration_run.mover import Mover
-from rig.calibration_run.recording import record
-from rig.calibration_run.stills import Photographer, Still
+from rig.calibration_run.onlooker import Onlooker
+from rig.calibration_run.recording import Recording, record
+from rig.calibration_run.stills import Photographer
 from rig.calibration_run.store import Store
+from rig.calibration_run.watching import Progress, Stop
 from rig.config import RigConfig
 
-FloatArray = NDArray[np.float64]
-
 _VERIFY_SEED = 1000  # other poses than those the fit has seen
-
-
-class Progress(Protocol):
-    """Whoever watches a calibration."""
-
-    def step(self, name: str, detail: str) -> None:
-        """A step begins."""
-        ...
-
-    def pose(self, report: PoseReport) -> None:
-        """A planned pose was looked from, or skipped."""
-        ...
 
 
 class Session:
@@ -70,7 +56,7 @@ class Session:
         before: CalibrationFile | None,
         depends_on: Fingerprints,
         progress: Progress,
-        stop_requested: Callable[[], bool],
+        stop: Stop,
     ) -> None:
         calibration = config.calibration
         self._plan = calibration.plan
@@ -81,22 +67,20 @@ class Session:
         self._path = path
         self._depends_on = depends_on
         self._progress = progress
+        self._stop = stop
         self._detector = BoardDetector(calibration.board)
         self._mover = Mover(
             bench.arm,
             bench.clock,
             config.safety,
             config.arm.hold_s,
-            stop_requested,
+            stop,
             self._plan.speed,
+            bench.T_tool_camera,
+            bench.deadman,
         )
         self._photographer = Photographer(bench.camera, self._mover, self._detect, bench.clock)
-        limits = self._plan.limits.model_copy(
-            update={
-                "workspace_min_m": config.safety.workspace_min_m,
-                "workspace_max_m": config.safety.workspace_max_m,
-            }
-        )
+        limits = within_safety(self._plan.limits, config.safety)
         self._limits = limits
         self._collector = Collector(
             self._mover,
@@ -107,10 +91,14 @@ class Session:
             self._board.square_m,
             store.add_still,
             progress.pose,
+            self._plan.hand_eye.min_poses,
         )
         self.file = before or CalibrationFile(
             rig=config.name, made=local_timestamp(), board=self._board
         )
+        lens = self.file.intrinsics
+        current = lens is not None and lens.depends_on == self._named("camera", "board")
+        self._from_images = lens if lens is not None and lens.from_images and current else None
         self.geometry: Geometry | None = None
         self.latency: LatencyFit | None = None
         self.verification: Verification | None = None
@@ -129,16 +117,42 @@ class Session:
 
     def collect(self) -> None:
         """Look at the board from as many poses as are planned, or as are still missing."""
-        wanted = self._plan.poses
-        self._progress.step("poses", f"{len(self._store.stills)} of {wanted} are there")
-        if not self._store.stills:
+        wanted, stills = self._plan.poses, self._store.stills
+        self._progress.step("poses", f"{len(stills)} of {wanted} are there", wanted)
+        if not stills:
             self._store.add_still(self._collector.first_look())
-        self._collector.collect(list(self._store.stills), wanted)
+        elif len(stills) < wanted:
+            self._collector.check_place(stills[0])
+        taken = self._collector.collect(list(stills), wanted)
+        if len(taken) < wanted:
+            self._progress.note(
+                f"only {len(taken)} of {wanted} poses: {len(self._collector.skipped)} were skipped"
+            )
+
+    def collect_by_hand(self, keys: KeySource, show: Callable[[Glance], None]) -> None:
+        """Take stills where a person brings the arm, at every key; see ``ByHand``."""
+        bench, mover, start = self._bench, self._mover, self._collector.state
+        jog = HandJog(mover, start.T_tool_camera) if bench.moves else None
+        stand = mover if bench.moves else Onlooker(bench.arm, bench.clock, self._stop)
+        hand = ByHand(
+            bench.camera,
+            Photographer(bench.camera, stand, self._detect, bench.clock),
+            self._detect,
+            bench.intrinsics,
+            jog,
+            self._store,
+            self._plan.hand_eye.min_poses,
+            self._plan.poses,
+        )
+        hand.run(keys, show, mover.check_stop)
 
     def fit(self) -> Geometry:
         """Intrinsics and hand-eye from all stills; raises CalibrationError."""
-        self._progress.step("fit", f"{len(self._store.stills)} stills")
-        geometry = fit_geometry(self._store.stills, self._board, self._plan.hand_eye)
+        self._progress.step("fit", f"intrinsics and hand-eye from {len(self._store.stills)} stills")
+        with self._stop.at_once():
+            geometry = fit_geometry(
+                self._store.stills, self._board, self._plan.hand_eye, self._from_images
+            )
         height, width = self._store.stills[0].image.shape[:2]
         hand_eye = geometry.hand_eye
         self.geometry = geometry
@@ -152,25 +166,15 @@ class Session:
 
     def measure_latency(self) -> LatencyFit:
         """Wiggle in front of the board and fit; raises CalibrationError."""
-        geometry, plan = self.geometry or self.fit(), self._plan
+        geometry = self.geometry or self.fit()
         if self._store.recording is None:
-            self._progress.step("latency", f"{plan.segments} wiggles of {plan.segment_s:g} s")
-            self._mover.go_to(self._store.stills[0].view.T_base_tool)
-            motions = [Excitation(plan.segment_s, seed=k + 1) for k in range(plan.segments)]
-            self._store.set_recording(
-                record(
-                    self._bench.camera,
-                    self._mover,
-                    self._bench.clock,
-                    self._detect_quickly,
-                    motions,
-                    geometry.hand_eye.T_tool_camera,
-                )
-            )
+            self._store.set_recording(self._record(geometry))
         recording = self._store.recording
         assert recording is not None  # either it was there or it was made
+        self._progress.step("fit", "latency")
         try:
-            self.latency = fit_delay(recording, geometry)
+            with self._stop.at_once():
+                self.latency = fit_delay(recording, geometry)
         except CalibrationError:
             self._store.drop_recording()  # the same again would fail again
             raise
@@ -179,10 +183,20 @@ class Session:
 
     def check(self) -> Verification:
         """Small motions along and about each axis, and fresh poses; raises CalibrationError."""
-        geometry = self.geometry or self.fit()
-        self._progress.step("verification", "small motions, then fresh poses")
-        wiggles = self._wiggle()
-        self.verification = verify(self._fresh(geometry), wiggles, geometry)
+        geometry, wanted = self.geometry or self.fit(), self._plan.verify_poses
+        mover, photographer, progress = self._mover, self._photographer, self._progress
+        first = self._store.stills[0]
+        progress.step("verification", "small motions", SMALL_MOTIONS)
+        wiggles = small_motions(mover, photographer, first.view.T_base_tool, progress.done)
+        progress.step("verification", "fresh poses", wanted)
+        size = (first.image.shape[1], first.image.shape[0])
+        scene = Scene(geometry.state, corner_points(self._board), size, first.view.T_base_tool)
+        # Some may be refused: a few more than are needed.
+        poses = plan_poses(
+            scene, 2 * wanted + 2, self._limits, reachable=mover.reach(), seed=_VERIFY_SEED
+        )
+        stills = fresh_stills(mover, photographer, poses[::-1], wanted, progress.pose)
+        self.verification = verify(stills, wiggles, geometry)
         self._save(
             verification=verification_result(
                 self.verification.wiggles, self._depends_on, self.verification.error.px
@@ -195,38 +209,20 @@ class Session:
         self._save(verdict=judge(self.file, self._required))
         return self.file
 
-    def _wiggle(self) -> list[Wiggle]:
-        home = self._store.stills[0].view.T_base_tool
-        wiggles = []
-        for axis, step in enumerate(wiggle_steps()):
-            self._mover.go_to(home)
-            before = self._photographer.take()
-            self._mover.go_to(home @ se3.exp(step))
-            wiggles.append(Wiggle(axis, before.view, self._photographer.take().view))
-        self._mover.go_to(home)
-        return wiggles
-
-    def _fresh(self, geometry: Geometry) -> list[Still]:
-        first = self._store.stills[0]
-        size = (first.image.shape[1], first.image.shape[0])
-        scene = Scene(geometry.state, corner_points(self._board), size, first.view.T_base_tool)
-        wanted = self._plan.verify_poses
-        # Some may be refused: a few more than are needed.
-        poses = plan_poses(scene, 2 * wanted + 2, self._limits, seed=_VERIFY_SEED)[::-1]
-        stills: list[Still] = []
-        for pose in tour(poses, self._mover.T_base_tool):
-            if len(stills) == wanted:
-                break
-            try:
-                self._mover.go_to(pose.T_base_tool)
-                stills.append(self._photographer.take())
-            except (PoseRefusedError, CalibrationError) as error:
-                self._progress.pose(PoseReport(len(stills), wanted, pose, str(error)))
-            else:
-                self._progress.pose(PoseReport(len(stills), wanted, pose, ""))
-        if not stills:
-            raise CalibrationError("no fresh pose showed the board: widen calibration.plan.limits")
-        return stills
+    def _record(self, geometry: Geometry) -> Recording:
+        plan, bench = self._plan, self._bench
+        detail = f"{plan.segments} wiggles of {plan.segment_s:g} s"
+        self._progress.step("latency", detail, plan.segments)
+        self._mover.go_to(self._store.stills[0].view.T_base_tool)
+        return record(
+            bench.camera,
+            self._mover,
+            bench.clock,
+            self._detect_quickly,
+            [Excitation(plan.segment_s, seed=k + 1) for k in range(plan.segments)],
+            geometry.hand_eye.T_tool_camera,
+            self._progress,
+        )
 
     def _detect(self, image: GreyImage) -> BoardView:
         return _view(self._detector.find(image))
@@ -240,6 +236,7 @@ class Session:
 
     def _save(self, **sections: object) -> None:
         """Put sections into the file; a verdict on what was there before no longer holds."""
+        self._mover.check_stop()
         cleared = {} if "verdict" in sections else {"verdict": None}
         self.file = self.file.model_copy(update={"made": local_timestamp(), **cleared, **sections})
         save_calibration(self.file, self._path)

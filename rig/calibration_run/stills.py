@@ -2,6 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import Clock
 from drivers.errors import DeviceTimeoutError
@@ -9,7 +13,6 @@ from drivers.interfaces import Camera, Frame, GreyImage
 from rig.calibration.averaging import average_views, largest_motion_px
 from rig.calibration.errors import CalibrationError
 from rig.calibration.views import BoardView, PosedView
-from rig.calibration_run.mover import Mover
 
 # Finds the board's corners; raises CalibrationError with the reason when it cannot.
 Detect = Callable[[GreyImage], BoardView]
@@ -18,6 +21,23 @@ _GUARD_S = 0.12  # stamps may be this wrong: a picture counts when stamped this 
 _PICTURES = 4  # averaged
 _STILL_PX = 0.15  # motion of the corners' mean between pictures
 _TIMEOUT_S = 2.5
+
+
+class Stand(Protocol):
+    """What keeps the arm at rest, or waits until somebody else does."""
+
+    @property
+    def T_base_tool(self) -> NDArray[np.float64]:
+        """The newest measured pose (4, 4)."""
+        ...
+
+    def settle(self) -> float:
+        """The instant since which the arm rests; raises PoseRefusedError when it does not."""
+        ...
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass while the arm rests."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +51,11 @@ class Still:
 
 
 class Photographer:
-    """Takes stills with the camera of a rig whose arm the mover keeps at rest."""
+    """Takes stills with the camera of a rig whose arm rests on its stand."""
 
-    def __init__(self, camera: Camera, mover: Mover, detect: Detect, clock: Clock) -> None:
+    def __init__(self, camera: Camera, stand: Stand, detect: Detect, clock: Clock) -> None:
         self._camera = camera
-        self._mover = mover
+        self._stand = stand
         self._detect = detect
         self._clock = clock
 
@@ -45,7 +65,7 @@ class Photographer:
         Raises CalibrationError when the board is not seen well or does not come to rest in the
         image, DeviceTimeoutError when no picture comes.
         """
-        rest_s = self._mover.settle()
+        rest_s = self._stand.settle()
         views: list[BoardView] = []
         begin_s, reason, last, delay_s = self._clock.now_s(), "", None, 0.0
         for frame in self._frames(begin_s + _TIMEOUT_S):
@@ -65,7 +85,7 @@ class Photographer:
                 views = [view]
             if len(views) == _PICTURES:
                 return Still(
-                    PosedView(average_views(views), self._mover.T_base_tool),
+                    PosedView(average_views(views), self._stand.T_base_tool),
                     frame.image,
                     frame.t_exposure_mid_s,
                     delay_s,
@@ -77,15 +97,15 @@ class Photographer:
         raise CalibrationError(reason or "too few pictures came while the arm was at rest")
 
     def _frames(self, until_s: float) -> "FrameFlow":
-        return FrameFlow(self._camera, self._mover, self._clock, until_s)
+        return FrameFlow(self._camera, self._stand, self._clock, until_s)
 
 
 class FrameFlow:
-    """Iterates over new frames while the mover keeps the arm at rest, until an instant."""
+    """Iterates over new frames while the arm rests, until an instant."""
 
-    def __init__(self, camera: Camera, mover: Mover, clock: Clock, until_s: float) -> None:
+    def __init__(self, camera: Camera, stand: Stand, clock: Clock, until_s: float) -> None:
         self._camera = camera
-        self._mover = mover
+        self._stand = stand
         self._clock = clock
         self._until_s = until_s
 
@@ -97,5 +117,5 @@ class FrameFlow:
             frame = self._camera.read(timeout_s=0.0)
             if frame is not None:
                 return frame
-            self._mover.wait(0.01)
+            self._stand.wait(0.01)
         raise StopIteration

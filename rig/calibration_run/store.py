@@ -1,8 +1,11 @@
 """What was collected, kept on disk as it comes, so that an interrupted calibration goes on."""
 
+import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
@@ -23,46 +26,55 @@ class Store:
     """A directory of stills and a recording that were taken under the same conditions.
 
     ``conditions`` names them (board, camera, arm); data taken under others cannot be resumed.
-    Raises ConfigError where the directory cannot be written.
+    Without ``resume`` what was there before stays until the first new still is added. Every
+    file is written as a whole or not at all. Raises ConfigError where that is not possible.
     """
 
     def __init__(self, directory: Path, conditions: Mapping[str, str], resume: bool) -> None:
-        self._directory = directory
+        self.directory = directory
+        self._conditions = dict(conditions)
+        self._begun = resume
         self.stills: list[Still] = []
         self.recording: Recording | None = None
-        try:
+        with self._writing():
             directory.mkdir(parents=True, exist_ok=True)
-            if resume:
-                self._load(conditions)
-            else:
-                self._clear()
-            text = json.dumps(dict(conditions), indent=2)
-            (directory / _CONDITIONS).write_text(text + "\n", encoding="utf-8")
-        except OSError as error:
-            raise ConfigError(
-                f"cannot write the calibration's data {directory}: {error}"
-            ) from error
+            _replace(directory / "writable", b"")
+            (directory / "writable").unlink()
+        if resume:
+            self._load()
 
     def add_still(self, still: Still) -> None:
         """Keep a still; it is on disk when this returns."""
-        path = self._directory / f"still-{len(self.stills):03d}"
         board = still.view.board
-        cv2.imwrite(str(path.with_suffix(".png")), still.image)
-        np.savez(
-            path.with_suffix(".npz"),
+        done, png = cv2.imencode(".png", still.image)
+        assert done  # a grey image always is a PNG
+        data = _npz(
             ids=board.ids,
             points_m=board.points_m,
             pixels=board.pixels,
             T_base_tool=still.view.T_base_tool,
             stamps=np.array([still.t_s, still.delay_s]),
         )
+        with self._writing():
+            self._begin()
+            path = self.directory / f"still-{len(self.stills):03d}"
+            # The picture first: what the numbers are looked for by is there last.
+            _replace(path.with_suffix(".png"), np.asarray(png).tobytes())
+            _replace(path.with_suffix(".npz"), data)
         self.stills.append(still)
+
+    def drop_still(self) -> None:
+        """Forget the last still, also on disk."""
+        path = self.directory / f"still-{len(self.stills) - 1:03d}"
+        with self._writing():
+            path.with_suffix(".npz").unlink(missing_ok=True)
+            path.with_suffix(".png").unlink(missing_ok=True)
+        self.stills.pop()
 
     def set_recording(self, recording: Recording) -> None:
         """Keep a recording in place of the one before; it is on disk when this returns."""
         views = [view for segment in recording.segments for view in segment]
-        np.savez(
-            self._directory / _RECORDING,
+        data = _npz(
             segments=np.array([len(segment) for segment in recording.segments]),
             counts=np.array([len(view.board) for view in views]),
             stamps=np.array([view.t_s for view in views]),
@@ -74,32 +86,70 @@ class Store:
             delays_s=recording.delays_s,
             height=np.array(recording.height),
         )
+        with self._writing():
+            _replace(self.directory / _RECORDING, data)
         self.recording = recording
 
     def drop_recording(self) -> None:
         """Forget the recording, also on disk."""
-        (self._directory / _RECORDING).unlink(missing_ok=True)
+        with self._writing():
+            (self.directory / _RECORDING).unlink(missing_ok=True)
         self.recording = None
 
-    def _clear(self) -> None:
+    def _begin(self) -> None:
+        """Make room for new data, once."""
+        if self._begun:
+            return
         for pattern in ("still-*", _RECORDING):
-            for path in self._directory.glob(pattern):
+            for path in self.directory.glob(pattern):
                 path.unlink()
+        text = json.dumps(self._conditions, indent=2) + "\n"
+        _replace(self.directory / _CONDITIONS, text.encode())
+        self._begun = True
 
-    def _load(self, conditions: Mapping[str, str]) -> None:
-        path = self._directory / _CONDITIONS
+    def _load(self) -> None:
+        path = self.directory / _CONDITIONS
         if not path.exists():
-            raise ConfigError(f"{self._directory} holds nothing to resume: leave --resume out")
-        before = json.loads(path.read_text(encoding="utf-8"))
-        changed = [key for key in conditions if before.get(key) != conditions[key]]
+            raise ConfigError(f"{self.directory} holds nothing to resume: leave --resume out")
+        try:
+            before = json.loads(path.read_text(encoding="utf-8"))
+            changed = [k for k, now in self._conditions.items() if before.get(k) != now]
+            if not changed:
+                stills = sorted(self.directory.glob("still-*.npz"))
+                self.stills = [_still(one) for one in stills]
+                if (self.directory / _RECORDING).exists():
+                    self.recording = _recording(self.directory / _RECORDING)
+        except (OSError, ValueError, KeyError, AttributeError, BadZipFile) as error:
+            raise ConfigError(
+                f"the data in {self.directory} cannot be read ({error}): leave --resume out to "
+                "start anew"
+            ) from error
         if changed:
             raise ConfigError(
                 f"cannot resume: {', '.join(changed)} changed since the data in "
-                f"{self._directory} were taken; leave --resume out to start anew"
+                f"{self.directory} were taken; leave --resume out to start anew"
             )
-        self.stills = [_still(path) for path in sorted(self._directory.glob("still-*.npz"))]
-        if (self._directory / _RECORDING).exists():
-            self.recording = _recording(self._directory / _RECORDING)
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise ConfigError(
+                f"cannot write the calibration's data in {self.directory}: {error}"
+            ) from error
+
+
+def _npz(**arrays: NDArray[np.generic]) -> bytes:
+    out = io.BytesIO()
+    np.savez(out, **arrays)  # type: ignore[arg-type]
+    return out.getvalue()
+
+
+def _replace(path: Path, data: bytes) -> None:
+    partial = path.with_name(f"{path.name}.partial")
+    partial.write_bytes(data)
+    partial.replace(path)
 
 
 def _still(path: Path) -> Still:
@@ -109,7 +159,7 @@ def _still(path: Path) -> Still:
         view = PosedView(board, data["T_base_tool"])
     image = cv2.imread(str(path.with_suffix(".png")), cv2.IMREAD_GRAYSCALE)
     if image is None:
-        raise ConfigError(f"{path.with_suffix('.png')} is missing: leave --resume out")
+        raise OSError(f"{path.with_suffix('.png')} is missing or damaged")
     return Still(view, np.asarray(image, dtype=np.uint8), float(t_s), float(delay_s))
 
 

@@ -6,14 +6,18 @@ import numpy as np
 from rich.table import Table
 
 from rig.calibration.result import CalibrationFile, Json
-from rig.calibration_run.session import Session
 
 
-def json_of(session: Session, found: CalibrationFile, path: Path, wall_s: float) -> dict[str, Json]:
-    """What ``rig calibrate --json`` prints; None for what has not been calibrated."""
+def json_of(
+    delay: tuple[float, float], found: CalibrationFile, path: Path, wall_s: float
+) -> dict[str, Json]:
+    """What ``rig calibrate --json`` prints; None for what has not been calibrated.
+
+    ``delay`` is from a picture's stamp to the program's having it, and its standard deviation.
+    """
     lens, hand_eye, latency = found.intrinsics, found.hand_eye, found.latency
     verdict = found.verdict
-    delay_s, delay_std_s = session.delay_s
+    delay_s, delay_std_s = delay
     known = latency is not None and bool(np.isfinite(delay_s))
     return {
         "rig": found.rig,
@@ -57,7 +61,7 @@ def json_of(session: Session, found: CalibrationFile, path: Path, wall_s: float)
 
 def table(summary: dict[str, Json]) -> Table:
     """The result for a person."""
-    out = Table(title=f"calibration of {summary['rig']}: {summary['verdict']}", show_header=False)
+    out = Table(title=f"calibration of {summary['rig']}: {_in_words(summary)}", show_header=False)
     lens, hand_eye = summary["intrinsics"], summary["hand_eye"]
     if isinstance(lens, dict):
         std = lens["std"]
@@ -85,3 +89,10 @@ def table(summary: dict[str, Json]) -> Table:
         out.add_row(name, f"{factor * value:.3f} {unit}" if isinstance(value, float) else "–")
     out.add_row("file", str(summary["file"]))
     return out
+
+
+def _in_words(summary: dict[str, Json]) -> str:
+    """The verdict; a calibration that only lacks steps has not failed."""
+    reasons = summary["reasons"]
+    missing = isinstance(reasons, list) and all(" is missing: " in str(one) for one in reasons)
+    return "not complete" if summary["verdict"] == "failed" and missing else str(summary["verdict"])

@@ -1,14 +1,26 @@
 """``rig calibrate``: intrinsics, hand-eye, latency, verification; and the board to print."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.console import Console
 
+from rig.commands.calibrate_report import write_report_of
+from rig.commands.calibrate_request import (
+    DryRun,
+    FromImages,
+    Manual,
+    Realtime,
+    Request,
+    Resume,
+    Step,
+    earlier,
+    with_pictures,
+)
 from rig.commands.options import AsJson, Assignments, RigFile, Seed, warn
 from rig.exit_codes import ExitCode
 
@@ -16,7 +28,6 @@ if TYPE_CHECKING:
     from rig.calibration.result import CalibrationFile
     from rig.calibration_run.session import Session
     from rig.calibration_run.store import Store
-    from rig.config import RigConfig
 
 calibrate_app = typer.Typer(
     help="Find the camera's intrinsics, its place on the tool and the latency of its images; "
@@ -24,7 +35,6 @@ calibrate_app = typer.Typer(
     invoke_without_command=True,
 )
 
-Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
 _STEPS: dict[Step, str] = {
     "intrinsics": "Look at the board from many poses; intrinsics and hand-eye are fitted together.",
     "hand-eye": "Look at the board from many poses; intrinsics and hand-eye are fitted together.",
@@ -32,35 +42,6 @@ _STEPS: dict[Step, str] = {
     "verify": "Check the calibration with small motions and fresh poses.",
 }
 _ON_EARLIER_DATA = ("latency", "verify")
-Realtime = Annotated[
-    bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
-]
-Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with what an interrupted calibration collected.")
-]
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What the command line asks for."""
-
-    rig: Path | None
-    assignments: tuple[str, ...]
-    seed: int | None
-    resume: bool
-    realtime: bool
-    as_json: bool
-
-    def with_more(self, more: "Request") -> "Request":
-        """Options may stand before the step and after it; what stands after goes before."""
-        return Request(
-            more.rig or self.rig,
-            (*self.assignments, *more.assignments),
-            self.seed if more.seed is None else more.seed,
-            self.resume or more.resume,
-            self.realtime or more.realtime,
-            self.as_json or more.as_json,
-        )
 
 
 @calibrate_app.callback()
@@ -72,9 +53,13 @@ def calibrate(
     resume: Resume = False,
     realtime: Realtime = False,
     as_json: AsJson = False,
+    from_images: FromImages = None,
+    manual: Manual = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Calibrate everything, in order: intrinsics, hand-eye, latency, verification."""
-    context.obj = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json)
+    modes = from_images, manual, dry_run
+    context.obj = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json, *modes)
     if context.invoked_subcommand is None:
         _run("all", context.obj)
 
@@ -90,8 +75,12 @@ def _command(step: Step) -> Callable[..., None]:
         resume: Resume = False,
         realtime: Realtime = False,
         as_json: AsJson = False,
+        from_images: FromImages = None,
+        manual: Manual = False,
+        dry_run: DryRun = False,
     ) -> None:
-        own = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json)
+        modes = from_images, manual, dry_run
+        own = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json, *modes)
         _run(step, context.obj.with_more(own))
 
     return command
@@ -140,82 +129,95 @@ def board(
 
 
 def _run(step: Step, request: Request) -> None:
+    request.check(step)
+    if request.from_images is not None:
+        from rig.commands.calibrate_images import calibrate_from_images
+
+        calibrate_from_images(request.from_images, request)
+    elif request.dry_run:
+        from rig.commands.calibrate_dry_run import dry_run
+
+        dry_run(step, request)
+    else:
+        _on_the_rig(step, request)
+
+
+def _on_the_rig(step: Step, request: Request) -> None:
     from drivers.clock import WallClock
     from rig.build import is_simulated
     from rig.calibrated import calibration_path, fingerprints, with_nominal
-    from rig.calibration.result import CalibrationFile, load_calibration
     from rig.calibration_run.bench import open_bench
+    from rig.calibration_run.hand_view import HandView
+    from rig.calibration_run.keys import Keys
     from rig.calibration_run.progress import ConsoleProgress
     from rig.calibration_run.recorded import RecordedProgress, open_calibration_log, recorded
     from rig.calibration_run.session import Session
     from rig.calibration_run.store import Store
     from rig.calibration_run.summary import json_of, table
-    from rig.config_load import load_config
     from rig.stop_request import StopRequest
 
-    extra = [*request.assignments]
-    extra += [] if request.seed is None else [f"sim.seed={request.seed}"]
-    config = with_nominal(load_config("sphere", request.rig, extra))
+    config = request.config()
     path, depends_on = calibration_path(config), fingerprints(config)
+    before = earlier(step, path, depends_on)
+    config = with_nominal(with_pictures(config, before))
     console = Console(stderr=True)
     resume = request.resume or step in _ON_EARLIER_DATA
     store = Store(path.with_name(f"{config.name}-data"), depends_on, resume)
-    before: CalibrationFile | None = None
-    if step != "all" and path.exists():
-        before = load_calibration(path)
     wall = WallClock()
     start_s = wall.now_s()
     log_path = path.with_name(f"{config.name}-data") / f"log-{step}.mcap"
     realtime = request.realtime or not is_simulated(config)
+    by_hand = request.manual
+    # Before anything is opened: without a terminal there are no keys.
+    keys = Keys() if by_hand else None
     with (
-        StopRequest() as stop_requested,
-        open_bench(config, request.realtime) as bench,
+        _keeping(store),
+        StopRequest("stopping …" if by_hand else "stopping the arm …") as stop,
+        open_bench(config, request.realtime, by_hand) as bench,
         open_calibration_log(log_path, config, bench, realtime) as log,
     ):
-        session = Session(
-            config,
-            recorded(bench, log),
-            store,
-            path,
-            before,
-            depends_on,
-            RecordedProgress(ConsoleProgress(console), log, bench),
-            stop_requested,
-        )
-        found = _steps(session, step)
+        shown = ConsoleProgress(console)
+        progress = RecordedProgress(shown, log, bench)
+        watched = recorded(bench, log)
+        session = Session(config, watched, store, path, before, depends_on, progress, stop)
+        if keys is not None:
+            with keys, HandView(console) as view:
+                session.collect_by_hand(keys, view.show)
+        with shown:
+            found = _steps(session, step, by_hand)
         log.attach(path)
-    report = _report(session, store, found, path)
-    summary = {**json_of(session, found, path, wall.now_s() - start_s), "report": report}
+    report = write_report_of(session, store, found, path)
+    summary = json_of(session.delay_s, found, path, wall.now_s() - start_s) | {"report": report}
     if request.as_json:
         print(json.dumps(summary), flush=True)
     console.print(table(summary))
-    _finish(found, config, path)
+    _finish(found, "hand-eye" if by_hand else step, path)
 
 
-def _report(session: "Session", store: "Store", found: "CalibrationFile", path: Path) -> str | None:
-    """Write the report beside the calibration; where it is, None when that fails."""
-    from rig.calibration_report.material import Material
-    from rig.calibration_report.page import write_report
+@contextmanager
+def _keeping(store: "Store") -> Iterator[None]:
+    """Say what an interrupted calibration leaves behind; what failed for good is not resumed."""
+    from rig.calibration.errors import CalibrationError
 
-    material = Material(
-        found,
-        store.stills,
-        session.geometry,
-        store.recording,
-        session.latency,
-        session.verification,
-    )
     try:
-        page = write_report(path.with_name(f"{found.rig}-report"), material)
-    except OSError as error:  # the result stands all the same
-        warn(f"no report: {error}")
-        return None
-    warn(f"report: {page}")
-    return str(page)
+        yield
+    except CalibrationError:
+        raise
+    except BaseException:
+        if store.stills:
+            recorded = "" if store.recording is None else " and the wiggles"
+            warn(
+                f"kept: {len(store.stills)} poses{recorded} in {store.directory}; the same "
+                "command with --resume goes on from there"
+            )
+        raise
 
 
-def _steps(session: "Session", step: Step) -> "CalibrationFile":
+def _steps(session: "Session", step: Step, by_hand: bool) -> "CalibrationFile":
     """The step asked for, on what those before it left; then the verdict."""
+    if by_hand:
+        session.fit()
+        return session.conclude()  # the other steps move the arm by themselves
     if step in ("all", "intrinsics", "hand-eye"):
         session.collect()
         session.fit()
@@ -226,10 +228,13 @@ def _steps(session: "Session", step: Step) -> "CalibrationFile":
     return session.conclude()
 
 
-def _finish(found: "CalibrationFile", config: "RigConfig", path: Path) -> None:
+def _finish(found: "CalibrationFile", step: Step, path: Path) -> None:
+    """Say whether the result may be used; a step alone did its part whatever else is missing."""
     verdict = found.verdict
-    if verdict is not None and not verdict.passed:
-        for reason in verdict.reasons:
-            warn(f"not usable yet: {reason}")
+    if verdict is None or verdict.passed:
+        warn(f"{path}: `rig run` uses it from here on")
+        return
+    for reason in verdict.reasons:
+        warn(f"not usable yet: {reason}")
+    if step == "all" or not all(" is missing: " in reason for reason in verdict.reasons):
         raise typer.Exit(ExitCode.CALIBRATION)
-    warn(f"{path}: `rig run` uses it from here on")

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from rig.commands.options import Assignments, RigFile, Target, warn
+from rig.commands.options import Assignments, RigFile, warn
 
 sim_app = typer.Typer(
     help="An emulated rig behind the real protocols, to try the true drivers on.",
@@ -27,7 +27,10 @@ def serve(
     camera: Annotated[
         bool, typer.Option("--camera", help="Also stream the camera on its tool (MJPEG).")
     ] = False,
-    target: Target = "sphere",
+    target: Annotated[
+        Literal["sphere", "cylinder", "board"],
+        typer.Option(help="What stands before it; the board is what `rig calibrate` looks at."),
+    ] = "sphere",
     host: Host = "127.0.0.1",
     link: Annotated[
         Path, typer.Option(help="The gantry's serial port: a link to a pseudo-terminal.")
@@ -54,7 +57,7 @@ def serve(
 
     name = "loopback_ur5e.yaml" if arm == "ur" else "loopback_gantry.yaml"
     path = packaged_config(name) if rig is None else rig
-    config = load_config(target, path, assignments)
+    config = load_config("sphere" if target == "board" else target, path, assignments)
     clock = WallClock()
     end_s = clock.now_s() + for_s
     with (

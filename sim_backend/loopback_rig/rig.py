@@ -30,7 +30,7 @@ from sim_backend.loopback_ur.config import version_of
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
 from sim_backend.render_choice import choose_renderer, make_renderer
 from sim_backend.rig import mount
-from sim_backend.scene import Sphere, TargetKind, build_scene
+from sim_backend.scene import SceneKind, build_scene, middle_m
 from sim_backend.start import start_pose
 
 FloatArray = NDArray[np.float64]
@@ -67,7 +67,7 @@ class LoopbackRig:
         self,
         arm: ArmKind,
         config: SimConfig,
-        target: TargetKind,
+        target: SceneKind,
         clock: Clock,
         host: str,
         link: Path,
@@ -126,18 +126,16 @@ class LoopbackRig:
     def _serve_camera(
         self,
         config: SimConfig,
-        target: TargetKind,
+        target: SceneKind,
         clock: Clock,
         emulated: _Emulated,
         host: str,
         port: int,
     ) -> None:
         lens, scene = lens_of(config.camera), build_scene(config, target)
-        renderer = make_renderer(choose_renderer(config.renderer), scene, lens)
+        renderer = make_renderer(choose_renderer(config.renderer, target), scene, lens)
         motion = RemoteMotion(emulated.motion, emulated.tool_pose, mount(config), clock)
-        seen = scene.target
-        centre_m = seen.centre_m if isinstance(seen, Sphere) else seen.middle_m
-        exposure = Exposure(config.camera, lens, motion, centre_m)
+        exposure = Exposure(config.camera, lens, motion, middle_m(scene.target))
         camera = SimulatedCamera(config.camera, lens, motion, exposure, renderer, config.seed)
         self._stack.callback(camera.close)
         self.stream = self._stack.enter_context(MjpegServer(camera.read, host, port))
@@ -176,7 +174,7 @@ class LoopbackRig:
         self.close()
 
 
-def _start_pose(config: SimConfig, target: TargetKind) -> FloatArray:
+def _start_pose(config: SimConfig, target: SceneKind) -> FloatArray:
     """T_base_tool (4, 4) from which the camera sees the target as configured."""
     lens, scene = lens_of(config.camera), build_scene(config, target)
     T_base_camera = start_pose(scene.target, getattr(config, target).start, lens)

@@ -62,3 +62,33 @@ def test_it_fires_once_for_one_hang() -> None:
     clock.t_s = 2.0
     deadman.close()
     assert stops == [1]
+
+
+def test_an_arm_at_rest_is_not_guarded_until_the_next_command() -> None:
+    clock, stops = HandClock(), []
+    looked, fired = threading.Semaphore(0), threading.Event()
+
+    class Watched(HandClock):
+        def now_s(self) -> float:
+            looked.release()
+            return clock.t_s
+
+    def stop() -> None:
+        stops.append(1)
+        fired.set()
+
+    deadman = Deadman(Watched(), 0.01, stop)
+    deadman.feed()
+    deadman.rest()
+    clock.t_s = 1.0
+    deadman.feed()
+    deadman.rest()
+    clock.t_s = 2.0
+    while looked.acquire(blocking=False):
+        pass
+    assert stops == []
+    deadman.feed()
+    clock.t_s = 3.0
+    assert fired.wait(5.0)
+    deadman.close()
+    assert stops == [1]

@@ -126,32 +126,10 @@ def test_what_a_calibration_saw_and_did_is_recorded(folder: Path) -> None:
     assert replayed.exit_code == 2 and "'board'" in replayed.stderr
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        (["sim.board.visible=false"], "no board in view"),
-        (["sim.board.dictionary=DICT_5X5_100"], "wrong board"),
-        (["sim.camera.exposure_s=0.004", "calibration.board.squares=[4,3]"], "wrong board"),
-    ],
-)
-def test_a_board_that_cannot_be_used_is_named(here: Path, settings: list[str], words: str) -> None:
-    done = calibrate(settings=settings)
-    assert done.exit_code == 6
-    assert words in done.stderr
-    assert done.stdout == ""
-
-
 def test_nothing_to_resume_is_said(here: Path) -> None:
     done = calibrate("latency", settings=[])
     assert done.exit_code == 2
     assert "nothing to resume" in done.stderr
-
-
-def test_a_place_that_cannot_be_written_is_said_before_anything_moves(here: Path) -> None:
-    (here / "calibration").write_text("in the way", encoding="utf-8")
-    done = calibrate(settings=[])
-    assert done.exit_code == 2
-    assert "cannot write" in done.stderr
 
 
 def test_the_board_is_printed_with_its_definition(here: Path) -> None:

@@ -86,7 +86,7 @@ def test_after_a_refusal_the_next_pose_is_reached() -> None:
 def test_a_motion_is_followed_and_ends_at_rest() -> None:
     rig = Rig()
     begin_s = rig.clock.now_s()
-    rig.mover.follow(lambda t: 0.05 * np.sin(2 * np.pi * t) * np.eye(6)[0], 2.0)
+    rig.mover.follow(lambda t, T: 0.05 * np.sin(2 * np.pi * t) * np.eye(6)[0], 2.0)
     speeds = [s.twist_tool[0] for s in rig.mover.states if s.t_s > begin_s]
     assert max(speeds) == pytest.approx(0.05, rel=0.1)
     assert min(speeds) == pytest.approx(-0.05, rel=0.1)

@@ -1,0 +1,145 @@
+"""The options of ``rig calibrate`` and of its steps, as one object."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from drivers.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rig.calibration.result import CalibrationFile, Fingerprints
+    from rig.config import RigConfig
+
+Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
+Realtime = Annotated[
+    bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with what an interrupted calibration collected.")
+]
+FromImages = Annotated[
+    Path | None,
+    typer.Option(
+        "--from-images",
+        metavar="DIR",
+        help="Intrinsics from the pictures in this folder; nothing is opened, nothing moves.",
+    ),
+]
+Manual = Annotated[
+    bool,
+    typer.Option(
+        "--manual",
+        help="Move the arm by hand and press a key; it says what the next pose should add. "
+        "Intrinsics and hand-eye.",
+    ),
+]
+DryRun = Annotated[
+    bool,
+    typer.Option(
+        "--dry-run",
+        help="Plan and draw the poses as the simulated rig has them; nothing is opened, nothing "
+        "moves.",
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What the command line asks for."""
+
+    rig: Path | None
+    assignments: tuple[str, ...]
+    seed: int | None
+    resume: bool
+    realtime: bool
+    as_json: bool
+    from_images: Path | None
+    manual: bool
+    dry_run: bool
+
+    def with_more(self, more: "Request") -> "Request":
+        """Options may stand before the step and after it; what stands after goes before."""
+        return Request(
+            more.rig or self.rig,
+            (*self.assignments, *more.assignments),
+            self.seed if more.seed is None else more.seed,
+            self.resume or more.resume,
+            self.realtime or more.realtime,
+            self.as_json or more.as_json,
+            more.from_images or self.from_images,
+            self.manual or more.manual,
+            more.dry_run or self.dry_run,
+        )
+
+    def check(self, step: Step) -> None:
+        """Raise ConfigError for options that do not go with the step or with each other."""
+        modes = [
+            name
+            for name, given in (
+                ("--from-images", self.from_images is not None),
+                ("--manual", self.manual),
+                ("--dry-run", self.dry_run),
+            )
+            if given
+        ]
+        if len(modes) > 1:
+            raise ConfigError(f"{' and '.join(modes)} do not go together: choose one")
+        if modes and step in ("latency", "verify"):
+            raise ConfigError(f"{modes[0]} does not go with `rig calibrate {step}`")
+        if self.from_images is not None and step == "hand-eye":
+            raise ConfigError(
+                "--from-images finds the intrinsics only: where the camera sits on the tool takes "
+                "the arm; run `rig calibrate intrinsics --from-images …`, then `rig calibrate "
+                "hand-eye`"
+            )
+
+    def config(self) -> "RigConfig":
+        """The rig's configuration."""
+        from rig.config_load import load_config
+
+        extra = [*self.assignments, *([] if self.seed is None else [f"sim.seed={self.seed}"])]
+        return load_config("sphere", self.rig, extra)
+
+
+def earlier(step: Step, path: Path, now: "Fingerprints") -> "CalibrationFile | None":
+    """What a step goes on with; of a whole new calibration only intrinsics from pictures stay.
+
+    Raises ConfigError for a file that cannot be read.
+    """
+    from rig.calibration.result import load_calibration
+
+    if not path.exists():
+        return None
+    if step != "all":
+        return load_calibration(path)
+    try:
+        found = load_calibration(path)
+    except ConfigError:
+        return None  # it will be replaced
+    lens = found.intrinsics
+    if lens is None or not lens.from_images:
+        return None
+    if any(now.get(key) != then for key, then in lens.depends_on.items()):
+        return None
+    left = {"hand_eye": None, "latency": None, "verification": None, "verdict": None}
+    return found.model_copy(update=left)
+
+
+def with_pictures(config: "RigConfig", before: "CalibrationFile | None") -> "RigConfig":
+    """``config`` that starts from intrinsics found from pictures, where there are none given."""
+    from rig.config_calibration import IntrinsicsConfig
+
+    lens = None if before is None else before.intrinsics
+    if lens is None or not lens.from_images or config.calibration.intrinsics is not None:
+        return config
+    given = IntrinsicsConfig(
+        fx_px=lens.fx_px,
+        fy_px=lens.fy_px,
+        cx_px=lens.cx_px,
+        cy_px=lens.cy_px,
+        distortion=lens.distortion,
+    )
+    section = config.calibration.model_copy(update={"intrinsics": given})
+    return config.model_copy(update={"calibration": section})
