@@ -27,7 +27,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, RunResult]:
     settings = ["run.duration_s=0.6", "sim.renderer=raster", "sim.camera.latency_jitter_s=0"]
     config = load_config("sphere", None, settings)
     never = lambda: False  # noqa: E731
-    return run_dir, execute(config, "sphere", run_dir, False, QuietView(), never, (extra,))
+    result = execute(config, "sphere", run_dir, False, QuietView(), never, attachments=(extra,))
+    return run_dir, result
 
 
 @pytest.fixture
