@@ -101,9 +101,11 @@ def wiggles(results: Sequence[WiggleResult], size: tuple[int, int]) -> Figure:
     """Small motions of the tool: how the image should have moved, and how it did."""
     figure, grid = plt.subplots(2, 3, figsize=(14, 7.6))
     for axes, one in zip(grid.flat, results, strict=False):
+        largest_px = float(np.linalg.norm(one.predicted_px, axis=1).max())
+        stretch = max(_ARROW_PX / max(largest_px, 0.1), 1.0)
         for moved, colour, width, name in (
-            (one.predicted_px, "black", 0.008, "predicted"),
-            (one.observed_px, HELD_OUT, 0.0035, "observed"),
+            (one.predicted_px, "black", 0.007, "predicted"),
+            (one.observed_px, HELD_OUT, 0.0025, "observed"),
         ):
             axes.quiver(
                 *one.at_px.T,
@@ -111,13 +113,18 @@ def wiggles(results: Sequence[WiggleResult], size: tuple[int, int]) -> Figure:
                 color=colour,
                 angles="xy",
                 scale_units="xy",
-                scale=1,
+                scale=1.0 / stretch,
                 width=width,
+                headwidth=3.5,
+                headlength=4,
+                minlength=0,
                 label=name,
             )
         verdict = "" if one.passed else ": NOT as predicted"
         axes.set_title(
-            f"{one.axis}: {one.motion_px:.1f} px, {one.mismatch_px:.2f} px off{verdict}",
+            f"{one.axis}: {one.motion_px:.1f} px, {one.mismatch_px:.2f} px off{verdict}"
+            f" (drawn × {stretch:.0f})",
+            fontsize=10,
             color="black" if one.passed else "#b00020",
         )
         _frame(axes, size)
