@@ -70,7 +70,7 @@ def _one(
     if as_json:
         print(json.dumps({key: done.summary[key] for key in JSON_KEYS}), flush=True)
     Console(stderr=as_json).print(table(done.summary))
-    _explain(recording, done, changed=bool(assignments))
+    _explain(recording, done, source, changed=bool(assignments))
     if done.summary["radius_m"] is None:
         raise typer.Exit(ExitCode.TARGET_LOST)
 
@@ -99,7 +99,7 @@ def _sweep(
     console.print(f"plot: {path}", highlight=False)
 
 
-def _explain(recording: "Recording", done: "Replay", changed: bool) -> None:
+def _explain(recording: "Recording", done: "Replay", source: str, changed: bool) -> None:
     from rig.replay.compare import first_difference
 
     if done.images_missing:
@@ -114,7 +114,9 @@ def _explain(recording: "Recording", done: "Replay", changed: bool) -> None:
     if changed:
         return
     difference = first_difference(done.recorded, done.replayed)
-    if difference:
+    if difference and source == "images" and done.config.log.images == "jpeg":
+        warn(f"the images were recorded as JPEG, which does not keep every bit: {difference}")
+    elif difference:
         warn(f"differs from the run (activerig {recording.version}): {difference}")
     else:
         count = len(done.replayed.updates)
