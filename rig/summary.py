@@ -152,7 +152,7 @@ def _log(summary: Mapping[str, Json]) -> str:
         return "–"
     text = f"{size / 1e6:.1f} MB, {summary['images_recorded']} images"
     if summary["images_not_recorded"]:
-        text += f", {summary['images_not_recorded']} dropped: the disk was too slow"
+        text += f", {summary['images_not_recorded']} dropped: writing was too slow"
     error = summary["log_error"]
     return text if error is None else f"{text}, ended early: {error}"
 

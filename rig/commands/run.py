@@ -172,7 +172,9 @@ def _explain(result: "RunResult", transient: bool) -> None:
         )
     lost = result.summary["images_not_recorded"]
     if lost:
-        warn(f"warning: the disk was too slow for {lost} images, which are not in the log")
+        warn(
+            f"warning: {lost} images are not in the log, writing was too slow: try log.images=jpeg"
+        )
     if not outcome.at_rest:
         warn("warning: the arm was not seen at rest after its stop; check it before coming near")
 

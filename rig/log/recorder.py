@@ -102,7 +102,7 @@ class Recorder:
             else:
                 self._thread.join(_CLOSE_TIMEOUT_S)
                 if self._thread.is_alive():
-                    self._fail(f"the disk took nothing for {_CLOSE_TIMEOUT_S:g} s")
+                    self._fail(f"the rest was not written within {_CLOSE_TIMEOUT_S:g} s")
             self._result = Recorded(
                 self._file.size_bytes,
                 self._images,
@@ -130,10 +130,11 @@ class Recorder:
             if self._clock is not None:  # the loop may have nothing more to say
                 self._flush(self._clock.now_s())
         self._drain()
-        self._file.close()
+        if not self._error:
+            self._file.close()
 
     def _drain(self) -> None:
-        while self._waiting:
+        while self._waiting and not self._error:
             logged_s, entry = self._waiting.popleft()
             logged_ns = self._encoder.ns(logged_s)
             if isinstance(entry, Attached):
@@ -164,7 +165,6 @@ class Recorder:
     def _fail(self, why: str) -> None:
         if not self._error:
             self._error = why
-            self._waiting.clear()
             self._warn(f"warning: the recording ends here, the run goes on: {why}")
 
 
