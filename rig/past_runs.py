@@ -7,15 +7,13 @@ from pathlib import Path
 from rich.table import Table
 
 from drivers.errors import ConfigError
-from rig.log.run_log import LOG_NAME
-from rig.recorded.read import read_summary
 from rig.recorded.setup import SETUP_NAME, RunSetup, read_setup
+from rig.recorded.summary import read_summary
 from rig.records import SUMMARY_NAME, Json
-from rig.report.headline import number
-from rig.report.texts import date_text, figure
+from rig.report.texts import date_text, figure, number
 
 # Any of them makes a directory a run's; they come into being in this order.
-_MARKS = ("config.yaml", SETUP_NAME, LOG_NAME, SUMMARY_NAME)
+_MARKS = ("config.yaml", SETUP_NAME, SUMMARY_NAME)
 _DEEPEST = 3  # `rig reproduce` keeps its runs in a directory of its own
 
 

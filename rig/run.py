@@ -36,7 +36,7 @@ from rig.log.run_log import open_run_log
 from rig.loop import RunLoop
 from rig.outcome import RunOutcome
 from rig.realtime import control_conditions
-from rig.recorded import RunSetup, write_setup
+from rig.recorded.setup import RunSetup, write_setup
 from rig.records import Json, write_config
 from rig.rehearsal import rehearse
 from rig.run_data import RunData

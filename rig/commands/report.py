@@ -24,9 +24,9 @@ def report(
 ) -> None:
     """Write report.html (one page, no network needed) and report.png; several runs are overlaid."""
     from drivers.errors import ConfigError
-    from rig.recorded import read_run
+    from rig.recorded.read import read_run
     from rig.records import make_figures_dir
-    from rig.report import write_reports
+    from rig.report.write import write_reports
 
     records = [read_run(run_dir) for run_dir in runs]
     alone = out is None and len(runs) == 1

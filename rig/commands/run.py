@@ -84,9 +84,9 @@ def run(
     from rig.config_load import load_config
     from rig.page.address import page_address
     from rig.page.watching import watching
-    from rig.recorded import read_run
+    from rig.recorded.read import read_run
     from rig.records import make_run_dir, write_summary
-    from rig.report import write_reports
+    from rig.report.write import write_reports
     from rig.run import execute
     from rig.stop_request import StopRequest
     from rig.summary import JSON_KEYS, table

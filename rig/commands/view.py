@@ -19,7 +19,7 @@ def view(
     from drivers.clock import WallClock
     from drivers.errors import ConfigError
     from rig.page.address import page_address
-    from rig.recorded import read_run
+    from rig.recorded.read import read_run
 
     address = page_address(view_host, view_port, view_token)
     record = read_run(run)

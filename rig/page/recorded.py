@@ -11,7 +11,7 @@ from rig.outlined import outlined
 from rig.page.panel import Panel
 from rig.page.scene import Scene
 from rig.page.state import PageState, with_arm, with_estimate, with_feature
-from rig.recorded import RunRecord
+from rig.recorded.record import RunRecord
 
 FloatArray = NDArray[np.float64]
 

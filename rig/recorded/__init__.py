@@ -1,18 +1,5 @@
 """A past run, read back from its directory: the one place that knows how it was recorded.
 
-``read_run`` is all that reports, lists and the page need; the log's format is behind it.
+``read_run`` (read.py) is all that reports and the page need, ``read_setup`` (setup.py) all that a
+list needs; the log's format is behind them.
 """
-
-from rig.recorded.read import read_run
-from rig.recorded.record import Command, FrameEntry, RunRecord
-from rig.recorded.setup import RunSetup, read_setup, write_setup
-
-__all__ = [
-    "Command",
-    "FrameEntry",
-    "RunRecord",
-    "RunSetup",
-    "read_run",
-    "read_setup",
-    "write_setup",
-]

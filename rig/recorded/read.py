@@ -1,6 +1,5 @@
 """Reads a run directory back, as far as the run came."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ from rig.log.reader import Log
 from rig.recorded.pictures import IMAGE_KINDS, loader
 from rig.recorded.record import Command, FrameEntry, Picture, RunRecord
 from rig.recorded.setup import read_setup
-from rig.records import SUMMARY_NAME, Json
+from rig.recorded.summary import read_summary
 from rig.replay.recording import Estimated, Event, Seen, States, Tick, open_recording
 from rig.run_data import RunData
 
@@ -51,15 +50,6 @@ def read_run(run_dir: Path) -> RunRecord:
         events=tuple(events),
         pictures=pictures,
     )
-
-
-def read_summary(run_dir: Path) -> dict[str, Json] | None:
-    """``summary.json``, or None when the run never got that far or it was cut off in writing."""
-    try:
-        summary = json.loads((run_dir / SUMMARY_NAME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return summary if isinstance(summary, dict) else None
 
 
 def _rest(

@@ -1,12 +1,11 @@
 """The radius of a finished run and how far it can be trusted."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from rig.recorded import RunRecord
-from rig.records import Json
+from rig.recorded.record import RunRecord
+from rig.report.texts import number
 from rig.spread import left_m
 
 _SCATTER_OVER_S = 1.0
@@ -37,12 +36,6 @@ def error_bar(record: RunRecord) -> ErrorBar | None:
     if stated is not None:
         return ErrorBar(stated, STATED)
     return ErrorBar(_judged_m(record, number(summary, "transient_left") or 0.0), JUDGED)
-
-
-def number(summary: Mapping[str, Json], key: str) -> float | None:
-    """A figure of the summary; None where it is unknown."""
-    value = summary.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _judged_m(record: RunRecord, left: float) -> float:

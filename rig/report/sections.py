@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from rig.config_load import dump_config
-from rig.report.headline import error_bar, number
+from rig.report.headline import error_bar
 from rig.report.shown import Shown
 from rig.report.stills import stills
-from rig.report.texts import date_text, escape, figure, json_text
+from rig.report.texts import date_text, escape, figure, json_text, number
 
 _NO_IMAGES = "<p>none was recorded</p>"
 _CUT_OFF = "the run was cut off: there is no summary"

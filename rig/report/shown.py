@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis import Analysis, analyse
-from rig.recorded import RunRecord
+from rig.recorded.record import RunRecord
 
 FloatArray = NDArray[np.float64]
 

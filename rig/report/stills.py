@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 
 from rig.outlined import outlined
-from rig.recorded import RunRecord
+from rig.recorded.record import RunRecord
 
 _JPEG_QUALITY = 80
 _SHOWN = 6

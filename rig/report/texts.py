@@ -2,6 +2,7 @@
 
 import html
 import json
+from collections.abc import Mapping
 from datetime import datetime
 
 from rig.records import Json
@@ -28,3 +29,9 @@ def date_text(started_at: str) -> str:
         return f"{datetime.strptime(started_at, '%Y%m%d-%H%M%S'):%Y-%m-%d %H:%M:%S}"
     except ValueError:
         return started_at
+
+
+def number(summary: Mapping[str, Json], key: str) -> float | None:
+    """A figure of the summary; None where it is unknown."""
+    value = summary.get(key)
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.recorded import RunRecord
+from rig.recorded.record import RunRecord
 
 FloatArray = NDArray[np.float64]
 

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from rig.report.headline import error_bar, number
+from rig.report.headline import error_bar
 from rig.report.shown import Shown
+from rig.report.texts import number
 
 
 def title(runs: Sequence[Shown]) -> str:

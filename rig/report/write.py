@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rig.recorded import RunRecord
+from rig.recorded.record import RunRecord
 from rig.report.page import page
 from rig.report.png import write_png
 from rig.report.shown import shown

@@ -8,7 +8,7 @@ import pytest
 
 from rig.background_view import BackgroundView
 from rig.outcome import LiveStatus
-from rig.recorded import RunSetup
+from rig.recorded.setup import RunSetup
 
 PATIENCE_S = 10.0
 

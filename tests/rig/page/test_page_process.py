@@ -22,7 +22,7 @@ from rig.page.address import PageAddress
 from rig.page.live import LivePage
 from rig.page.state import state_of, state_of_bytes
 from rig.page.watching import Watching
-from rig.recorded import RunSetup
+from rig.recorded.setup import RunSetup
 from rig.vision import Sighting
 from sim_backend.clock import SimulatedClock
 from tests.rig.command_line import rig

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rig.page.recorded import RecordedStates
-from rig.recorded import RunRecord, read_run
+from rig.recorded.read import read_run
+from rig.recorded.record import RunRecord
 from tests.rig.command_line import rig
 from tests.rig.report.recorded_runs import record
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.log.run_log import LOG_NAME
-from rig.recorded import read_run
+from rig.recorded.read import read_run
 from rig.report.headline import JUDGED, STATED, error_bar
 from tests.rig.command_line import rig
 from tests.rig.log_lines import log_bytes

@@ -8,7 +8,8 @@ import pytest
 
 from estimator.image.intrinsics import Intrinsics
 from rig.config_load import load_config
-from rig.recorded import FrameEntry, RunRecord, RunSetup
+from rig.recorded.record import FrameEntry, RunRecord
+from rig.recorded.setup import RunSetup
 from rig.replay.recording import Tick
 from rig.report.timing import dropped_at_s, image_latency_s, tick_lateness_s
 from rig.run_data import RunData
