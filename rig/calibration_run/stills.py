@@ -20,7 +20,8 @@ Detect = Callable[[GreyImage], BoardView]
 _GUARD_S = 0.12  # stamps may be this wrong: a picture counts when stamped this long after rest
 _PICTURES = 4  # averaged
 _STILL_PX = 0.15  # motion of the corners' mean between pictures
-_TIMEOUT_S = 2.5
+_TIMEOUT_S = 2.5  # for the next picture
+_LONGEST_S = 4 * _TIMEOUT_S
 
 
 class Stand(Protocol):
@@ -68,7 +69,8 @@ class Photographer:
         rest_s = self._stand.settle()
         views: list[BoardView] = []
         begin_s, reason, last, delay_s = self._clock.now_s(), "", None, 0.0
-        for frame in self._frames(begin_s + _TIMEOUT_S):
+        flow = self._frames(begin_s + _TIMEOUT_S)
+        for frame in flow:
             if frame.t_exposure_mid_s < rest_s + _GUARD_S:
                 continue
             try:
@@ -80,6 +82,8 @@ class Photographer:
                 continue
             last, delay_s = frame, self._clock.now_s() - frame.t_exposure_mid_s
             views.append(view)
+            # A camera of few pictures a second gets the time it needs.
+            flow.until_s = min(self._clock.now_s() + _TIMEOUT_S, begin_s + _LONGEST_S)
             if largest_motion_px(views) > _STILL_PX:
                 reason = "the board moves in the image although the arm is at rest"
                 views = [view]
@@ -107,13 +111,13 @@ class FrameFlow:
         self._camera = camera
         self._stand = stand
         self._clock = clock
-        self._until_s = until_s
+        self.until_s = until_s
 
     def __iter__(self) -> "FrameFlow":
         return self
 
     def __next__(self) -> Frame:
-        while self._clock.now_s() < self._until_s:
+        while self._clock.now_s() < self.until_s:
             frame = self._camera.read(timeout_s=0.0)
             if frame is not None:
                 return frame
