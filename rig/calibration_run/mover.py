@@ -26,6 +26,7 @@ _NEAR_M, _NEAR_RAD = 5e-4, 1e-3  # close enough: where it came to rest is what c
 _AT_REST_M_S, _AT_REST_RAD_S = 2e-3, 8e-3
 _REST_S = 0.15  # at rest for this long: settled
 _FIRST_STATE_S = 2.0
+_ATTEMPTS = 3
 _PATIENCE = 3.0  # times the duration that the way should take
 _LEAST_PATIENCE_S = 3.0
 
@@ -81,24 +82,26 @@ class Mover:
         way = self._way(T_base_tool)
         patience_s = _PATIENCE * self._duration_s(way) + _LEAST_PATIENCE_S
         start_s = self._clock.now_s()
-        blocked = ""
 
         def towards(elapsed_s: float, state: ArmState) -> FloatArray | None:
             way = se3.log(se3.inverse(state.T_base_tool) @ T_base_tool)
             near = np.linalg.norm(way[:3]) < _NEAR_M and np.linalg.norm(way[3:]) < _NEAR_RAD
             return None if near else self._approach(way)
 
-        blocked = self._drive(towards, patience_s)
-        self.settle()
-        left = self._way(T_base_tool)
-        far = np.linalg.norm(left[:3]) > 4 * _NEAR_M or np.linalg.norm(left[3:]) > 4 * _NEAR_RAD
+        for _ in range(_ATTEMPTS):
+            blocked = self._drive(towards, patience_s)
+            self.settle()
+            left = self._way(T_base_tool)
+            apart_m, apart_rad = (float(np.linalg.norm(part)) for part in (left[:3], left[3:]))
+            far = apart_m > 4 * _NEAR_M or apart_rad > 4 * _NEAR_RAD
+            if blocked or not far:
+                break  # else it ran past: commands came late
         if far:
             why = f"blocked by: {blocked}" if blocked else "it does not get there"
             took_s = self._clock.now_s() - start_s
             raise PoseRefusedError(
-                f"the arm stopped {1e3 * np.linalg.norm(left[:3]):.1f} mm and "
-                f"{np.degrees(np.linalg.norm(left[3:])):.1f}° before the pose after "
-                f"{took_s:.1f} s: {why}"
+                f"the arm stopped {1e3 * apart_m:.1f} mm and {np.degrees(apart_rad):.1f}° before "
+                f"the pose after {took_s:.1f} s: {why}"
             )
 
     def follow(
@@ -180,7 +183,11 @@ class Mover:
             try:
                 self._arm.command_twist(allowed.twist_tool, self._hold_s)
             except MotionRefusedError as error:
-                return str(error)
+                self._arm.stop()
+                self._limiter.restart()
+                if np.any(wanted):
+                    return str(error)
+                continue  # the ramp to rest was refused: the arm brakes by itself
             if self._deadman is not None:
                 self._deadman.feed()
             if allowed.blocked:

@@ -77,8 +77,8 @@ def record(
         for number, motion in enumerate(motions, start=1):
             segments.append([])
             mover.wait(_MARGIN_S)
-            follower = _follower(mover.T_base_tool, T_tool_camera, motion)
-            mover.follow(follower, motion.duration_s)
+            twist_of = follower(mover.T_base_tool, T_tool_camera, motion)
+            mover.follow(twist_of, motion.duration_s)
             mover.wait(_MARGIN_S)
             progress.done(number)
     finally:
@@ -100,7 +100,7 @@ def record(
     )
 
 
-def _follower(
+def follower(
     T_base_tool: FloatArray, T_tool_camera: FloatArray, motion: Excitation
 ) -> Callable[[float, FloatArray], FloatArray]:
     """The tool's twist by time and pose (4, 4) that gives the camera ``motion`` from here.

@@ -125,7 +125,11 @@ def moves(motion: Motion) -> NDArray[np.bool_]:
 
 @contextmanager
 def served(
-    arm: ArmKind, folder: Path, small: bool = True, for_s: float = 1800.0
+    arm: ArmKind,
+    folder: Path,
+    small: bool = True,
+    for_s: float = 1800.0,
+    target: Literal["sphere", "board"] = "sphere",
 ) -> Iterator[Served]:
     """``rig sim serve`` with its camera until the block ends; ``small``: cheap pictures."""
     host, link = free_host(), folder / "gantry"
@@ -133,6 +137,7 @@ def served(
         [
             *(*RIG, "sim", "serve", "--arm", arm, "--host", host, "--link", str(link)),
             *("--camera", "--port", "0", "--for", str(for_s), "--set", "sim.renderer=raster"),
+            *("--target", target),
             *(part for key, value in _SMALL.items() if small for part in _camera(key, value)),
         ],
         stderr=subprocess.PIPE,

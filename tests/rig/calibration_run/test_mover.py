@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from drivers.errors import SafetyError
+from drivers.errors import MotionRefusedError, SafetyError
 from rig.calibration import se3
+from rig.calibration.excitation import Excitation
 from rig.calibration_run.errors import PoseRefusedError, StopRequestedError
 from rig.calibration_run.mover import Mover
-from rig.config_safety import SafetyConfig
+from rig.calibration_run.recording import follower
+from rig.config_safety import SafetyConfig, TableConfig
 from sim_backend.arm import SimulatedArm
 from sim_backend.clock import SimulatedClock
 from sim_backend.config import ArmConfig
@@ -22,7 +24,7 @@ class Rig:
     """The simulated arm with nothing around it."""
 
     def __init__(self, safety: SafetyConfig = SAFETY) -> None:
-        self.clock = SimulatedClock()
+        self.clock, self.safety = SimulatedClock(), safety
         self.arm = SimulatedArm(ArmConfig(), World(ArmConfig(), HOME, self.clock), seed=1)
         self.stop = False
         self.mover = Mover(self.arm, self.clock, safety, 0.05, lambda: self.stop)
@@ -105,3 +107,88 @@ def test_an_arm_outside_its_workspace_is_not_moved() -> None:
     rig = Rig(SafetyConfig(workspace_max_m=(-0.5, 2.0, 2.0)))
     with pytest.raises(SafetyError, match="outside the workspace"):
         rig.mover.go_to(moved(rig.mover.T_base_tool, [0.01, 0.0, 0.0], [0.0, 0.0, 0.0]))
+
+
+class Guard:
+    """Notes what a deadman would be told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def feed(self) -> None:
+        self.told.append("feed")
+
+    def rest(self) -> None:
+        self.told.append("rest")
+
+
+def test_the_deadman_is_fed_while_it_moves_and_relieved_at_rest() -> None:
+    rig, guard = Rig(), Guard()
+    rig.mover = Mover(
+        rig.arm,
+        rig.clock,
+        SAFETY,
+        0.05,
+        lambda: False,
+        deadman=guard,  # type: ignore[arg-type]
+    )
+    rig.mover.go_to(moved(rig.mover.T_base_tool, [0.05, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert guard.told.count("feed") > 50
+    assert "rest" not in guard.told[:-1]
+    assert guard.told[-1] == "rest"
+
+
+def test_a_motion_that_the_arm_refuses_is_a_pose_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig()
+    goal = moved(rig.mover.T_base_tool, [0.1, 0.0, 0.0], [0.0, 0.0, 0.0])
+    command = rig.arm.command_twist
+
+    def refuse(twist_tool: np.ndarray, hold_s: float) -> None:
+        if np.any(twist_tool[:3]) and rig.clock.now_s() > 0.5:
+            raise MotionRefusedError("axis X is at its end")
+        command(twist_tool, hold_s)
+
+    monkeypatch.setattr(rig.arm, "command_twist", refuse)
+    with pytest.raises(PoseRefusedError, match="axis X is at its end"):
+        rig.mover.go_to(goal)
+    assert rig.at_rest()
+
+
+def test_whatever_goes_wrong_in_a_motion_the_arm_is_told_to_stop() -> None:
+    rig = Rig()
+
+    def fail(now_s: float) -> None:
+        if now_s > 0.5:
+            raise KeyError("a bug")
+
+    rig.mover.on_tick = fail
+    with pytest.raises(KeyError):
+        rig.mover.go_to(moved(rig.mover.T_base_tool, [0.3, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert rig.at_rest()
+
+
+def test_the_camera_is_kept_off_the_table_too() -> None:
+    camera = np.eye(4)
+    camera[2, 3] = 0.06
+    rig = Rig(SafetyConfig(table=TableConfig(offset_m=0.3, min_distance_m=0.05)))
+    low = rig.mover.T_base_tool.copy()
+    low[2, 3] = 0.38  # the tool clears the table, a camera in front of it does not
+    assert rig.mover.reach().blocked_by(low) == ""
+    rig.mover = Mover(rig.arm, rig.clock, rig.safety, 0.05, lambda: False, T_tool_camera=camera)
+    assert rig.mover.reach().blocked_by(low) == "table (camera)"
+
+
+def test_a_motion_with_late_commands_is_drawn_back_to_where_it_should_be() -> None:
+    rig = Rig()
+    motion, start = Excitation(3.0, seed=3), rig.mover.T_base_tool
+
+    def late(now_s: float) -> None:
+        # Ticks that are missed: the arm runs out of commands again and again.
+        if int(10 * now_s) % 4 == 0:
+            rig.clock.sleep_until(now_s + 0.25)
+
+    rig.mover.on_tick = late
+    rig.mover.follow(follower(start, np.eye(4), motion), motion.duration_s + 2.0)
+    back = se3.log(se3.inverse(start) @ rig.mover.T_base_tool)
+    assert np.linalg.norm(back[:3]) < 8e-3
+    assert np.linalg.norm(back[3:]) < 0.03
