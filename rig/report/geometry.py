@@ -30,7 +30,12 @@ def path_figure(runs: Sequence[Shown]) -> Figure:
     return {
         "data": data,
         "layout": {
-            "title": {"text": "camera path with optical axes, base frame", "font": {"size": 14}},
+            "title": {
+                "text": "camera path with optical axes, base frame",
+                "font": {"size": 14},
+                "x": 0.02,
+                "xanchor": "left",
+            },
             "font": {"family": "system-ui, sans-serif", "size": 11, "color": "#1f2933"},
             "margin": {"l": 0, "r": 0, "t": 44, "b": 0},
             "scene": {

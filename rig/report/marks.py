@@ -36,7 +36,7 @@ def layout(title: str, y: str, x: str = "t [s]", from_zero: bool = False) -> dic
     if from_zero:
         y_axis["rangemode"] = "tozero"
     return {
-        "title": {"text": title, "font": {"size": 14}},
+        "title": {"text": title, "font": {"size": 14}, "x": 0.02, "xanchor": "left"},
         "font": _FONT,
         "margin": {"l": 64, "r": 16, "t": 40, "b": 76},
         "xaxis": {"title": {"text": x}, "zeroline": False, "gridcolor": "#e6e9ee"},
