@@ -17,7 +17,7 @@ from tests.rig.calibration_run.small_rig import SMALL, calibrate
 from tests.rig.command_line import RIG
 
 CLOCK = WallClock()
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 # From pose to pose: tilts to both sides, rolls, nearer, aside; 2 and 3 choose the size of steps.
 POSES = (
     *("", "3j", "ll", "ji", "kk", "i2oooo", "pppppppp"),
