@@ -21,7 +21,7 @@ PATIENCE_S = 240.0
 # From pose to pose: tilts to both sides, rolls, nearer, aside; 2 and 3 choose the size of steps.
 POSES = (
     *("", "3j", "ll", "ji", "kk", "i2oooo", "pppppppp"),
-    *("oooo3ff", "2dddw", "aaaaaas", "dddwwww3i", "2ssss3kk"),
+    *("oooo3ff", "2dddw", "aaaaaas", "dddwww", "ssssss"),
 )
 
 
