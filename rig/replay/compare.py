@@ -19,8 +19,8 @@ def first_difference(recorded: Kept, replayed: Kept) -> str:
                 return f"{len(a)} {name}s were recorded, {len(b)} come from the replay"
             if not _same(one, other):
                 return (
-                    f"{name} {number} at {one.t_s:.6f} s: recorded 1/R = {one.chi!r}, "
-                    f"replayed {other.chi!r} at {other.t_s:.6f} s"
+                    f"{name} {number} at {one.t_s:.6f} s: recorded 1/R = {one.chi!r}, s = "
+                    f"{one.s.tolist()}, replayed {other.chi!r}, {other.s.tolist()}"
                 )
     return ""
 
