@@ -80,12 +80,18 @@ class KalmanFilter:
     are believed again, χ̂ being kept, and are named a contradiction. Where innovations are
     larger than claimed, all variances are stated that much larger.
 
+    ``time_std_s`` is how uncertain an image's instant is against the arm's stamps: an image is
+    as much less certain as the target may have moved in it meanwhile.
+
     Slower than 1 mm/s the camera counts as standing and its images tell nothing new of χ.
     """
 
-    def __init__(self, model: Model, prior: RadiusPrior, noise: TwistNoise) -> None:
+    def __init__(
+        self, model: Model, prior: RadiusPrior, noise: TwistNoise, time_std_s: float = 0.0
+    ) -> None:
         self._model = model
         self._prior = prior
+        self._time_std_s = time_std_s
         self._noise = noise.covariance
         self._state: _State | None = None
         self._innovations = Innovations()
@@ -114,7 +120,8 @@ class KalmanFilter:
         if len(motion) and not motion.covers(state.t_s) and motion.covers(t_s):
             self._restart(t_s, s, axis, covariance, state)
             return Correction.RESTARTED
-        x, P, _ = self._moved(state, axis, t_s, motion)
+        x, P, twist = self._moved(state, axis, t_s, motion)
+        covariance += self._blur(x, axis, twist)
         after, P_after, nis = seen(x, P, s, covariance, axis)
         residual = float(np.linalg.norm(s - x[:3]))
         if not self._innovations.admits(float(nis), 3 if measured_axis is None else 2):
@@ -151,14 +158,22 @@ class KalmanFilter:
 
     def _moved(
         self, state: _State, axis: FloatArray, t_s: float, motion: TwistHistory
-    ) -> tuple[FloatArray, FloatArray, float]:
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The state and its covariance at the next image, and the twist (6,) there."""
         window = motion.window(state.t_s, t_s)
         R, d = displacement(window.times_s, window.twists_camera)
         x, P = moved(
             *(state.x, state.P, R, d, axis, self._spectrum(motion)),
             *(t_s - state.t_s, REST_SIGMA),
         )
-        return x, P, window.extrapolated_s
+        return x, P, window.twists_camera[-1]
+
+    def _blur(self, x: FloatArray, axis: FloatArray, twist: FloatArray) -> FloatArray:
+        """What an uncertain instant adds to an image's covariance (3, 3): (12) or (20) times it."""
+        v, omega = twist[:3], twist[3:]
+        s_dot = np.cross(x[:3], omega) - x[3] * (v - axis * float(axis @ v))
+        spread = self._time_std_s * s_dot
+        return np.outer(spread, spread)
 
     def _spectrum(self, motion: TwistHistory) -> FloatArray:
         covariance = self._noise if motion.covariance is None else motion.covariance

@@ -31,6 +31,8 @@ class EstimatorConfig(Section):
     # Standard deviations of a measured twist, for arms that do not report theirs.
     twist_std_m_s: NotNegative = 2e-4
     twist_std_rad_s: NotNegative = 5e-4
+    # Of an image's instant against the arm's stamps, as good as latencies are calibrated.
+    time_std_s: NotNegative = 5e-4
 
     @model_validator(mode="after")
     def _guess_in_range(self) -> Self:

@@ -204,7 +204,7 @@ def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
     noise = TwistNoise(chosen.twist_std_m_s, chosen.twist_std_rad_s)
     if chosen.kind == "limb_plane_ekf":
         return ExtendedKalmanFilter(model, prior, noise)
-    return KalmanFilter(model, prior, noise)
+    return KalmanFilter(model, prior, noise, chosen.time_std_s)
 
 
 def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: FusionLog) -> Fusion:

@@ -85,6 +85,19 @@ def test_a_latency_that_is_wrong_by_50_ms_is_reported(late_s: float) -> None:
     assert "the latency is wrong" in images(t_late_s=late_s).doubt
 
 
+def test_an_instant_as_uncertain_as_was_said_leaves_no_doubt() -> None:
+    rng, doubts = np.random.default_rng(8), []
+    for time_std_s in (0.0, 2e-3):
+        prior = RadiusPrior(0.03, 0.01, 0.09)
+        kalman, history = KalmanFilter(model_of(BALL), prior, TWIST, time_std_s), ARM.history(rng)
+        for t_s in SHORT[2:]:
+            feature = noisy(MOTION.feature(BALL, t_s - 2e-3), NOISE_PX, rng)
+            kalman.correct(feature, t_s, history)
+        assert kalman.estimate is not None
+        doubts.append(kalman.estimate.doubt)
+    assert doubts[0] and not doubts[1]
+
+
 @pytest.mark.parametrize("share", [(0.2, 0.3, 0.5), (2.0, 3.0, 6.0)])
 def test_a_range_that_excludes_the_radius_is_reported(share: tuple[float, float, float]) -> None:
     low, guess, high = (factor * BALL.radius_m for factor in share)
