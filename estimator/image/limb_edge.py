@@ -15,7 +15,8 @@ BLUR = 6
 MOST_PIXELS = 352  # across the outline in one sector
 R_GEOMETRY, R_BLUR, R_SHIFT, R_GREY, R_RESIDUAL, MODEL_ROWS = 7, 11, 17, 18, 19, 20
 # Then its weight, space for weighting two rows, and what the model is told.
-WEIGHT, WEIGHTED, E_TAU, E_D, E_NU, E_NV, E_BEND, E_GEOMETRY, ALL_ROWS = 20, 21, *range(23, 29), 32
+WEIGHT, WEIGHTED, E_TAU, E_D, E_NU, E_NV, E_BEND, E_GEOMETRY = 20, 21, *range(23, 29)
+E_CLUTTER, E_CLUTTER_VARIANCE, ALL_ROWS = 32, 33, 34
 # Motion narrower than this is differentiated as if it were this wide: nearer to zero the
 # derivative is a spike between the pixels.
 _SMOOTH_WIDTH_PX = 0.7
@@ -47,6 +48,8 @@ def edge_rows(
             rows[R_GREY * MOST_PIXELS + i],
             rows[E_D * MOST_PIXELS + i],
         )
+        clutter = rows[E_CLUTTER * MOST_PIXELS + i]
+        clutter_variance = rows[E_CLUTTER_VARIANCE * MOST_PIXELS + i]
         nu, nv, bend = (
             rows[E_NU * MOST_PIXELS + i],
             rows[E_NV * MOST_PIXELS + i],
@@ -65,19 +68,21 @@ def edge_rows(
         _, _, c_w2, c_var = edge_step(d, ba, bb, max(bw, _SMOOTH_WIDTH_PX))
         rise, root, root_1 = edge_rise(d, ba, bb, bw)
         out = 1.0 - share
+        grey -= out * clutter
+        rows[R_GREY * MOST_PIXELS + i] = grey
         rows[i], rows[MOST_PIXELS + i] = out, out * tau
         rows[2 * MOST_PIXELS + i] = d - rise
         rows[3 * MOST_PIXELS + i], rows[4 * MOST_PIXELS + i] = share, share * tau
         rows[5 * MOST_PIXELS + i], rows[6 * MOST_PIXELS + i] = rise, root
         model = out * (p0 + p1 * tau) + p2 * (d - rise)
         r = grey - model - share * (p3 + p4 * tau) - p5 * rise - p6 * root
-        variance = read + out * out * texture
+        variance = read + out * out * (texture + clutter_variance)
         tail = (freedom + 1.0) / (freedom * variance + r * r)
         rows[WEIGHT * MOST_PIXELS + i] = robust * tail + (1.0 - robust) / variance
         seen = 1.0 if share > _SEEN and share < 1.0 - _SEEN else 0.0
         seen_count += seen
         chi2 += seen * r * r / variance
-        contrast = p3 + p4 * tau - p0 - p1 * tau
+        contrast = p3 + p4 * tau - p0 - p1 * tau - clutter
         by_d = seen * (contrast * c1 + p2 + (p5 - p2) * share + p6 * root_1)
         by_bend = by_d * bend / 24.0
         by_w2 = seen * (contrast * c_w2 + (p5 - p2) * c1 / 24.0)

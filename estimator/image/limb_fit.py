@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.image.edges_camera import pack_camera
+from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
 from estimator.image.intrinsics import FloatArray, Intrinsics
 from estimator.image.limb_pixels import collect
 from estimator.image.limb_solve import solve_outline, step_rad
@@ -18,9 +19,13 @@ from estimator.image.limb_verdict import in_view, verdict
 
 GreyImage = NDArray[np.uint8]
 
+# The band of pixels looked at, to both sides of the outline, and the length of its sectors.
 _BAND_PX = 6.0
-_SPHERE_SECTOR_PX, _CYLINDER_SECTOR_PX = 12.0, 22.0
+_SPHERE_SECTOR_PX, _CYLINDER_SECTOR_PX = 12, 22
 _CONVERGED_PX = 0.02
+# An outline's systematic error in px over the squared width of the motion in px: what makes the
+# normalised squared errors about 1 on side-lit, moving targets before clutter.
+_SHADING_SPHERE, _SHADING_CYLINDER = 0.0006, 0.002
 _LEAST_SECTORS = 6
 _NOTHING = np.empty(0)
 # Squared widths of the point spread and of the motion along two axes, and how alike is alike.
@@ -81,14 +86,13 @@ def _refine(
         return None
     camera = pack_camera(intrinsics)
     sector_px = _SPHERE_SECTOR_PX if axis0 is None else _CYLINDER_SECTOR_PX
-    pixels, starts = collect(image, camera, s0, a, _BAND_PX, _BAND_PX, sector_px)
+    pixels, starts = collect(image, camera, s0, a, _BAND_PX, _BAND_PX, float(sector_px))
     seen = in_view(starts)
     if np.count_nonzero(seen) < _LEAST_SECTORS:
         return None
-    geometry = 3 if axis0 is None else 4
     known = _NOTHING if learnt is None else learnt
     s, axis, blur, photometry, stats, noise, model, scatter, step, learnt = solve_outline(
-        pixels, starts, s0, a, geometry, known
+        image, pixels, starts, s0, a, sector_px, known
     )
     solved = math.isfinite(s.sum()) and math.isfinite(scatter.sum())
     converged = solved and intrinsics.fx_px * step_rad(step, s) < _CONVERGED_PX
@@ -99,7 +103,8 @@ def _refine(
     usable, chi2 = verdict(photometry, stats, noise, seen)
     return LimbFit(
         s=s,
-        covariance=_honest(model, scatter),
+        covariance=_honest(model, scatter)
+        + _shading_covariance(s, axis, blur, axis0 is None, intrinsics.fx_px),
         axis=None if axis0 is None else axis,
         converged=converged,
         blur_px=math.sqrt(blur[1]),
@@ -116,6 +121,23 @@ def _refine(
 def _alike(blur: FloatArray, known: FloatArray) -> bool:
     """Whether the blur found is about the known one, as it must be where few steps were made."""
     return all(abs(blur[i] - known[i]) < _ALIKE_PX2 + _ALIKE_SHARE * known[i] for i in _BLUR_WIDTHS)
+
+
+def _shading_covariance(
+    s: FloatArray, axis: FloatArray, blur: FloatArray, sphere: bool, focal_px: float
+) -> FloatArray:
+    """What is added (3, 3) for light that the model of its change across the outline misses.
+
+    Motion of width w mixes what lies w about the outline; the part of second order grows with w^2.
+    """
+    angle = (_SHADING_SPHERE if sphere else _SHADING_CYLINDER) * (blur[1] + blur[4]) / focal_px
+    norm2 = float(s @ s)
+    if sphere:  # |s| = 1 / sin(theta), and theta is the angle that is wrong
+        towards: FloatArray = angle**2 * (norm2 - 1.0) * np.outer(s, s)
+        return towards
+    one, other = lines_of_cylinder(s, axis)
+    spread = [np.outer(t, t) * angle**2 for t in (np.cross(axis, one), np.cross(axis, other))]
+    return cylinder_covariance(one, other, spread[0], spread[1])
 
 
 def _honest(model: FloatArray, scatter: FloatArray) -> FloatArray:

@@ -8,6 +8,8 @@ from estimator.image.limb_normal import N_IN, N_OUT, SS_IN, SS_OUT
 from estimator.jit import jit
 
 _LEAST_READ_VARIANCE = 0.1  # rounding to whole grey levels is 1/12
+# A side's shading stands out from five standard deviations on, and from 0.3 grey per px.
+_STANDS_OUT, _NO_SHADING = 25.0, 0.1
 
 
 @jit
@@ -40,13 +42,39 @@ def noise_levels(stats: FloatArray, noise: FloatArray, texture_weight: float) ->
 
 
 @jit
-def learn_ridge(
-    photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray, first: bool
+def learn_shading(
+    photometry: FloatArray, spread: FloatArray, stats: FloatArray, mean: FloatArray
 ) -> None:
+    """Expect each side of a cylinder to be shaded alike all along it.
+
+    Its normal is the same all along, so the slopes across and the limb terms are about their means,
+    as far as these stand out.
+    """
+    per_side = photometry.shape[0] // 2
+    for side in range(2):
+        first, last = side * per_side, (side + 1) * per_side
+        for j in (5, 6):
+            total = doubt = count = 0.0
+            for k in range(first, last):
+                if stats[k, N_IN] >= 6.0:
+                    total += photometry[k, j]
+                    doubt += spread[k, j]
+                    count += 1.0
+            level, variance = total / max(count, 1.0), doubt / max(count, 1.0) ** 2
+            noise = _STANDS_OUT * variance + _NO_SHADING
+            mean[first:last, j] = level * max(0.0, 1.0 - noise / (level * level + 1e-12))
+
+
+@jit
+def learn_ridge(
+    photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray,
+    mean: FloatArray, first: bool, predicted: bool,
+) -> None:  # fmt: skip
     """Learn from all sectors how large slopes and limb terms are here (empirical Bayes).
 
     ``first``: p was found almost without a prior, so that its own scatter is subtracted, and four
     standard deviations of what that leaves uncertain are added; later the usual expectation step.
+    ``predicted``: the background is known from elsewhere, and only the target's terms are learnt.
     """
     square = np.zeros(PHOTOMETRY)
     scatter = np.zeros(PHOTOMETRY)
@@ -56,11 +84,13 @@ def learn_ridge(
             continue
         count += 1
         for j in range(PHOTOMETRY):
-            square[j] += photometry[k, j] ** 2
+            square[j] += (photometry[k, j] - mean[k, j]) ** 2
             scatter[j] += spread[k, j]
     if count == 0:
         return
     for j in (1, 2, 4, 5, 6):
+        if predicted and j < 3:
+            continue
         second = (square[j] + scatter[j]) / count
         if first:
             second = max(square[j] - scatter[j], 0.0) / count

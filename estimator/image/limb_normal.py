@@ -17,12 +17,6 @@ from estimator.image.intrinsics import FloatArray
 from estimator.image.limb_edge import (
     ALL_ROWS,
     BLUR,
-    E_BEND,
-    E_D,
-    E_GEOMETRY,
-    E_NU,
-    E_NV,
-    E_TAU,
     MODEL_ROWS,
     MOST_PIXELS,
     PHOTOMETRY,
@@ -35,8 +29,8 @@ from estimator.image.limb_edge import (
     edge_rows,
 )
 from estimator.image.limb_linear import inverse_diagonal, reduce_normal
-from estimator.image.limb_pixels import BEND, DISTANCE, GEOMETRY, GREY, HERE, NU, NV, TAU
-from estimator.jit import jit_inlined, jit_sums
+from estimator.image.limb_parts import parted, reach_px
+from estimator.jit import jit_sums
 
 # Columns of the sector statistics.
 N_OUT, SS_OUT, N_IN, SS_IN, N_EDGE, CHI_EDGE, SHIFT, SHIFT_INFO, STATS = 0, 1, 2, 3, 4, 5, 6, 7, 8
@@ -46,16 +40,20 @@ _VECTOR = 8
 @jit_sums
 def accumulate(
     pixels: FloatArray, starts: NDArray[np.int64], moved_by: FloatArray, blur: FloatArray,
-    turn_rad: float, photometry: FloatArray, noise: FloatArray,
-    ridge: FloatArray, heavy_tail: float, margin_px: float, information: FloatArray,
-    score: FloatArray, back: FloatArray, spread: FloatArray, stats: FloatArray, work: FloatArray,
+    turn_rad: float, photometry: FloatArray, noise: FloatArray, ridge: FloatArray,
+    mean: FloatArray, predicted: bool, heavy_tail: float, margin_px: float,
+    information: FloatArray, score: FloatArray, back: FloatArray, spread: FloatArray,
+    stats: FloatArray, work: FloatArray,
 ) -> None:  # fmt: skip
     """Fill each sector's reduced information, score, photometry back-substitution and statistics.
 
     ``moved_by`` (geometry,) is how far the geometry is from that at which the pixels were located,
     ``margin_px`` bounds the outline's error. ``noise`` (sectors, 2): variances of reading and of
-    the background. ``information`` (sectors, n, n), ``score`` (sectors, n) with n geometry and blur
-    parameters; ``back`` (sectors, PHOTOMETRY, n + 1): p = back[:, n] - back[:, :n] @ step;
+    the background. ``ridge`` (PHOTOMETRY,) and ``mean`` (sectors, PHOTOMETRY): the inverse prior
+    variance of p about its mean. ``predicted``: what is under the edge is `predict_clutter`'s, and
+    the pixels outside tell no more about it. ``information`` (sectors, n, n), ``score``
+    (sectors, n) with n geometry and blur parameters; ``back`` (sectors, PHOTOMETRY, n + 1):
+    p = back[:, n] - back[:, :n] @ step;
     ``spread`` (sectors, PHOTOMETRY): variances of p. ``heavy_tail``: the degrees of freedom of the
     residuals, 0 when p is unknown. ``work`` (3, ALL_ROWS * MOST_PIXELS) holds no NaN.
     """
@@ -73,18 +71,14 @@ def accumulate(
     fit = np.empty((PHOTOMETRY, width + 1))
     turn = np.array([np.cos(turn_rad), np.sin(turn_rad)])
     along = np.empty(2)
-    reach = (
-        margin_px
-        + 0.5 * np.sqrt(blur[0] * 2.0 + 1.0)
-        + 0.5 * np.sqrt(max(blur[1] + abs(blur[2]) + blur[4] + abs(blur[5]), 0.0))
-    )
+    reach = reach_px(blur, margin_px)
     stats[:] = 0.0
     per_line = (starts.shape[0] - 1) // 2
     along[1] = 2.0 / max(per_line, 1)
     for k in range(starts.shape[0] - 1):
         p, noise_k, stats_k = photometry[k], noise[k], stats[k]
         along[0] = (k % max(per_line, 1) + 0.5) * along[1] - 1.0
-        n_edge, n_out, n_in = _parted(
+        n_edge, n_out, n_in = parted(
             pixels, starts[k], starts[k + 1], moved_by, reach, rows, outside, inside
         )
         stats_k[N_EDGE], stats_k[CHI_EDGE] = edge_rows(
@@ -97,76 +91,23 @@ def accumulate(
             gpp[i, i] += ridge[i]
             for j in range(width):
                 rhs[i, j] = gram[at[j], i]
-            rhs[i, width] = gram[R_GREY, i]
+            rhs[i, width] = gram[R_GREY, i] + ridge[i] * mean[k, i]
         for j in range(width):
             for i in range(j + 1):
                 gtt[j, i] = gram[at[j], at[i]]
             gtt[j, width] = gram[R_RESIDUAL, at[j]]
         stats_k[N_OUT], stats_k[N_IN] = float(n_out), float(n_in)
-        stats_k[SS_OUT] = _weights(outside, n_out, p[:3], noise_k[0] + noise_k[1], heavy_tail)
-        _gram(outside, n_out, 4, gram)
-        _add_side(gram, 0, 3, gpp, rhs)
+        if not predicted:
+            variance = noise_k[0] + noise_k[1]
+            stats_k[SS_OUT] = _weights(outside, n_out, p[:3], variance, heavy_tail)
+            _gram(outside, n_out, 4, gram)
+            _add_side(gram, 0, 3, gpp, rhs)
         stats_k[SS_IN] = _weights(inside, n_in, p[3:], noise_k[0], heavy_tail)
         _gram(inside, n_in, 5, gram)
         _add_side(gram, 3, 4, gpp, rhs)
         reduce_normal(gpp, rhs, gtt, p, fit)
         inverse_diagonal(gpp, spread[k])
         _store(gtt, fit, information[k], score[k], back[k], stats_k)
-
-
-@jit_sums
-def _parted(
-    pixels: FloatArray, start: int, stop: int, moved_by: FloatArray, reach: float,
-    edge: FloatArray, outside: FloatArray, inside: FloatArray,
-) -> tuple[int, int, int]:  # fmt: skip
-    """Copy a sector's pixels to those across the outline, outside and inside; their numbers.
-
-    A sector's pixels come (almost) from the outside inwards; between the first and the last one
-    within ``reach`` of the outline, all count as across it.
-    """
-    _copied(pixels, DISTANCE, start, stop - start, pixels[HERE, start:stop], 0)
-    distances = pixels[HERE, start:stop]
-    for j in range(moved_by.shape[0]):
-        by, change = moved_by[j], pixels[GEOMETRY + j, start:stop]
-        for i in range(distances.shape[0]):
-            distances[i] += by * change[i]
-    first, last = 0, distances.shape[0]
-    while first < last and distances[first] < -reach:
-        first += 1
-    while last > first and distances[last - 1] > reach:
-        last -= 1
-    n_out, n_in = min(first, MOST_PIXELS), min(distances.shape[0] - last, MOST_PIXELS)
-    n_edge = min(last - first, MOST_PIXELS)
-    _copied(pixels, TAU, start, n_out, outside, MOST_PIXELS)
-    _copied(pixels, HERE, start, n_out, outside, 2 * MOST_PIXELS)
-    _copied(pixels, GREY, start, n_out, outside, 3 * MOST_PIXELS)
-    _copied(pixels, TAU, start + last, n_in, inside, MOST_PIXELS)
-    _copied(pixels, HERE, start + last, n_in, inside, 2 * MOST_PIXELS)
-    _copied(pixels, GREY, start + last, n_in, inside, 4 * MOST_PIXELS)
-    for i in range(n_out):
-        outside[i] = 1.0
-    for i in range(n_in):
-        inside[i] = 1.0
-        inside[3 * MOST_PIXELS + i] = np.sqrt(inside[2 * MOST_PIXELS + i])
-    for j in range(moved_by.shape[0]):
-        _copied(pixels, GEOMETRY + j, start + first, n_edge, edge, (E_GEOMETRY + j) * MOST_PIXELS)
-    _copied(pixels, TAU, start + first, n_edge, edge, E_TAU * MOST_PIXELS)
-    _copied(pixels, GREY, start + first, n_edge, edge, R_GREY * MOST_PIXELS)
-    _copied(pixels, HERE, start + first, n_edge, edge, E_D * MOST_PIXELS)
-    _copied(pixels, NU, start + first, n_edge, edge, E_NU * MOST_PIXELS)
-    _copied(pixels, NV, start + first, n_edge, edge, E_NV * MOST_PIXELS)
-    _copied(pixels, BEND, start + first, n_edge, edge, E_BEND * MOST_PIXELS)
-    return n_edge, n_out, n_in
-
-
-@jit_inlined
-def _copied(
-    pixels: FloatArray, row: int, begin: int, count: int, to: FloatArray, place: int
-) -> None:  # fmt: skip
-    """Copy ``count`` pixels of one row from ``begin`` on to ``place``."""
-    source, target = pixels[row, begin : begin + count], to[place : place + count]
-    for i in range(count):
-        target[i] = source[i]
 
 
 @jit_sums

@@ -7,10 +7,12 @@ from estimator.image.cone import distance, outline_frame
 from estimator.image.intrinsics import FloatArray
 from estimator.jit import jit
 
-# Rows of the collected pixels: ray and its Jacobian, grey, place along the sector; then, filled by
-# `locate`, distance to the outline, inward normal, curvature, derivatives by the geometry; last the
-# distance to where the outline has moved since.
-X, Y, J0, J1, J2, J3, GREY, TAU, DISTANCE, NU, NV, BEND, GEOMETRY, HERE, ROWS = *range(13), 16, 17
+# Rows of the collected pixels: ray and its Jacobian, grey, place along the sector, place in the
+# image; then, filled by `locate`, distance to the outline, inward normal, curvature, derivatives by
+# the geometry; then the distance to where the outline has moved since; last, zero or filled by
+# `predict_clutter`, what the background's grey is about its level, and the variance of that.
+X, Y, J0, J1, J2, J3, GREY, TAU, U, V, DISTANCE, NU, NV, BEND, GEOMETRY = range(15)
+HERE, CLUTTER, CLUTTER_VARIANCE, ROWS = 18, 19, 20, 21
 _COARSE_PX, _TILE_PX, _SMALL_TILE_PX = 32, 8, 2
 _NEWTON_STEPS = 12
 _MOST_SECTORS = 512
@@ -219,6 +221,8 @@ def _by_sector(
             pixels[j, at] = ray[j]
         pixels[GREY, at] = image[v, u]
         pixels[TAU, at] = taus[i]
+        pixels[U, at], pixels[V, at] = u, v
+        pixels[CLUTTER, at] = pixels[CLUTTER_VARIANCE, at] = 0.0
     return pixels, starts
 
 
@@ -235,4 +239,5 @@ def thinned(
         for i in range(some_starts[k], some_starts[k + 1]):
             for j in range(DISTANCE):
                 some[j, i] = pixels[j, starts[k] + (i - some_starts[k]) * stride]
+            some[CLUTTER, i] = some[CLUTTER_VARIANCE, i] = 0.0
     return some, some_starts

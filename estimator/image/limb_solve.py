@@ -4,24 +4,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.image.cone import moved, outline_frame
+from estimator.image.edges_camera import GreyImage
 from estimator.image.intrinsics import FloatArray
+from estimator.image.limb_blur import (
+    BLUR_MEAN,
+    BLUR_SD,
+    BLUR_START,
+    BLUR_START_CYLINDER,
+    diagonalised,
+    first_blur,
+)
+from estimator.image.limb_clutter import predict_clutter
 from estimator.image.limb_edge import ALL_ROWS, BLUR, MOST_PIXELS, PHOTOMETRY
 from estimator.image.limb_linear import cholesky, solve_column, solve_fixed
 from estimator.image.limb_locate import locate
-from estimator.image.limb_noise import learn_ridge, noise_levels
+from estimator.image.limb_noise import learn_ridge, learn_shading, noise_levels
 from estimator.image.limb_normal import STATS, accumulate
+from estimator.image.limb_parts import reach_px
 from estimator.image.limb_pixels import thinned
 from estimator.jit import jit
 
-# Prior of the blur parameters (q, M1, h1, M12, M2, h2): sharp to 4 px of motion are likely.
-_BLUR_MEAN = np.array([0.2, 0.5, 0.0, 0.0, 0.5, 0.0])
-_BLUR_SD = np.array([2.0, 8.0, 1.0, 8.0, 8.0, 1.0])
-# Between sharp and 3 px of motion: both are reached from there in few steps.
-_BLUR_START = np.array([0.3, 1.5, 0.0, 0.0, 1.5, 0.0])
-_BLUR_START_CYLINDER = np.array([0.3, 3.0, 0.0, 0.0, 0.0, 0.0])
 # What an image tells about the next one: the blur, the turn of its axes, the two noise levels.
 KNOWN = BLUR + 3
-_WIDE_Q = 4.0  # widens the model's edge at first, so that a wrong guess is within its reach
 _HEAVY_TAIL = 30.0
 # Texture is correlated: its variance counts twice. Not along a cylinder's long sectors, where once
 # gave the smaller error on textures of 2 to 8 px.
@@ -29,7 +33,11 @@ _TEXTURE_WEIGHT_SPHERE, _TEXTURE_WEIGHT_CYLINDER = 2.0, 1.0
 # The steps: geometry alone, then blur as well on a part of the pixels, then everything on all. The
 # photometry's spread is learnt in the first of these only: the slow rest of it brings nothing.
 _GEOMETRY_STEPS, _COARSE_STEPS, _LEARNING_STEPS, _ALL_STEPS = 1, 3, 2, 9
+_SHADING_STEPS = 5  # the first of these is left out: it finds the blur
 _CONVERGED_RAD = 1e-5
+_CLUTTER_MARGIN_PX = 0.5  # what the outline may be off where clutter is predicted
+_LEAST_TEXTURE = 1e-3
+_NO_SLOPE = 100.0  # inverse variance of what a prediction leaves of the background's slope
 _COARSE_STRIDE, _COARSE_MARGIN_PX, _FINE_MARGIN_PX = 4, 1.2, 0.3
 # Inverse prior variances of the photometry. Slopes and limb terms start stiff: they could stand
 # in for a blur not yet found. Then they are free, for their true spread to be learnt.
@@ -39,13 +47,13 @@ _FREE = np.array([1e-6, 1 / 400.0, 1 / 16.0, 1e-6, 1 / 400.0, 1 / 16.0, 1 / 400.
 
 @jit
 def solve_outline(
-    pixels: FloatArray, starts: NDArray[np.int64], s: FloatArray, a: FloatArray, geometry: int,
-    known: FloatArray,
+    image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], s: FloatArray, a: FloatArray,
+    sector_px: int, known: FloatArray,
 ) -> tuple[
     FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray,
     FloatArray, FloatArray, FloatArray,
 ]:  # fmt: skip
-    """Refine (s, a) on the collected pixels; ``geometry`` is 3 for a sphere, 4 for a cylinder.
+    """Refine (s, a) on the pixels collected from ``image``; a is zero for a sphere.
 
     ``known`` (KNOWN,) is what an image just before told of blur and noise, which saves the steps
     that look for them; empty if there is none.
@@ -55,6 +63,7 @@ def solve_outline(
     the sectors' scores, the last step, and what is now known. s is NaN when the equations had no
     solution.
     """
+    geometry = 3 + int(np.any(a != 0.0))
     sectors, n = starts.shape[0] - 1, geometry + BLUR
     information, score = np.zeros((sectors, n, n)), np.zeros((sectors, n))
     back, spread = np.zeros((sectors, PHOTOMETRY, n + 1)), np.zeros((sectors, PHOTOMETRY))
@@ -62,7 +71,7 @@ def solve_outline(
     noise = np.empty((sectors, 2))
     noise[:, 0], noise[:, 1] = 9.0, 100.0
     texture_weight = _TEXTURE_WEIGHT_SPHERE if geometry == 3 else _TEXTURE_WEIGHT_CYLINDER
-    blur, turn_rad = _first_blur(s, a, geometry)
+    blur, turn_rad = first_blur(s, a, geometry)
     ridge = _STIFF.copy()
     if known.shape[0] > 0:
         turn_rad = known[BLUR] if geometry == 3 else turn_rad
@@ -70,6 +79,7 @@ def solve_outline(
     total, step, frame = np.eye(n), np.zeros(n), outline_frame(s, a)
     s_there, a_there, moved_by = s, a, np.zeros(geometry)
     work = np.zeros((3, ALL_ROWS * MOST_PIXELS))
+    mean, texture = np.zeros((sectors, PHOTOMETRY)), 0.0  # positive where clutter is predicted
     used, used_starts = thinned(pixels, starts, _COARSE_STRIDE)
     locate(used, s, a, frame)
     index = -2
@@ -79,7 +89,7 @@ def solve_outline(
         settled = index > _COARSE_STEPS or (fine and known.shape[0] == 0)
         accumulate(
             used, used_starts, moved_by, blur, turn_rad, photometry,
-            noise, ridge, 0.0 if index < 0 else _HEAVY_TAIL,
+            noise, ridge, mean, texture > 0.0, 0.0 if index < 0 else _HEAVY_TAIL,
             _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, information, score, back, spread,
             stats, work,
         )  # fmt: skip
@@ -88,15 +98,15 @@ def solve_outline(
             moved_by += step[:geometry]
             s, a = moved(s_there, a_there, frame, moved_by)
             blur += step[geometry:]
-            turn_rad = _diagonalised(blur, turn_rad, geometry == 3)
-            noise_levels(stats, noise, texture_weight)
+            turn_rad = diagonalised(blur, turn_rad, geometry == 3)
+            noise_levels(stats, noise, texture_weight * (texture == 0.0))
         # A NaN anywhere arrives here: s then fails the comparison.
         if not s[0] ** 2 + s[1] ** 2 + s[2] ** 2 > 1.0 + 1e-9:
             s = s * np.nan
             break
         _back_substitute(back, step, photometry)
         if index == _GEOMETRY_STEPS - 1:
-            blur[:] = _BLUR_START if geometry == 3 else _BLUR_START_CYLINDER
+            blur[:] = BLUR_START if geometry == 3 else BLUR_START_CYLINDER
         all_next = index == _COARSE_STEPS - 1 or (index < 0 and known.shape[0] > 0)
         if all_next:
             ridge = _FREE.copy()
@@ -104,15 +114,45 @@ def solve_outline(
         if index == _GEOMETRY_STEPS - 1 or all_next:
             s_there, a_there, frame, moved_by = s, a, outline_frame(s, a), np.zeros(geometry)
             locate(used, s, a, frame)
-        if fine and index < _COARSE_STEPS + _LEARNING_STEPS:
-            learn_ridge(photometry, spread, stats, ridge, index == _COARSE_STEPS)
+            if all_next and geometry == 4:
+                texture = _foresee(image, used, starts, sector_px, blur, noise, ridge)
+        _learn(
+            photometry, spread, stats, ridge, mean, index - _COARSE_STEPS, geometry == 4,
+            texture > 0.0,
+        )  # fmt: skip
         if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and step_rad(step, s) < _CONVERGED_RAD:
             break
     model, scatter = _covariances(total, information, score, frame, s)
     learnt = np.empty(KNOWN)
     learnt[:BLUR], learnt[BLUR] = blur, turn_rad
-    learnt[BLUR + 1], learnt[BLUR + 2] = noise[0, 0], np.mean(noise[:, 1])
+    learnt[BLUR + 1], learnt[BLUR + 2] = noise[0, 0], np.mean(noise[:, 1]) + texture
     return s, a, blur, photometry, stats, noise, model, scatter, step, learnt
+
+
+@jit
+def _foresee(
+    image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], sector_px: int,
+    blur: FloatArray, noise: FloatArray, ridge: FloatArray,
+) -> float:  # fmt: skip
+    """Predict clutter if there is some; the variance known so far, which this replaces, or 0."""
+    reach = reach_px(blur, _CLUTTER_MARGIN_PX)
+    if not predict_clutter(image, pixels, starts, sector_px, reach, noise[0, 0]):
+        return 0.0
+    texture = max(float(np.mean(noise[:, 1])), _LEAST_TEXTURE)
+    noise[:, 1], ridge[2] = 0.0, _NO_SLOPE
+    return texture
+
+
+@jit
+def _learn(
+    photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray,
+    mean: FloatArray, age: int, cylinder: bool, predicted: bool,
+) -> None:  # fmt: skip
+    """What to expect of the photometry, ``age`` steps after all pixels came in."""
+    if cylinder and 1 <= age < _SHADING_STEPS:
+        learn_shading(photometry, spread, stats, mean)
+    if 0 <= age < _LEARNING_STEPS:
+        learn_ridge(photometry, spread, stats, ridge, mean, age == 0, predicted)
 
 
 @jit
@@ -120,18 +160,6 @@ def step_rad(step: FloatArray, s: FloatArray) -> float:
     """How far a step of the geometry moves the outline, seen from the camera."""
     turn = abs(step[1]) + abs(step[2])
     return float(turn + abs(step[0]) / (s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
-
-
-@jit
-def _first_blur(s: FloatArray, a: FloatArray, geometry: int) -> tuple[FloatArray, float]:
-    """The blur to start with, and the turn of its axes: a cylinder's across its lines."""
-    blur = _BLUR_MEAN.copy()
-    blur[0] = _WIDE_Q
-    if geometry == 3:
-        return blur, 0.0
-    blur[4] = 0.0
-    b = outline_frame(s, a)[1]
-    return blur, np.arctan2(b[1] * s[2] - b[2] * s[1], b[0] * s[2] - b[2] * s[0])
 
 
 @jit
@@ -161,7 +189,7 @@ def _step(
                 total[i, j] += information[k, i, j]
     motion2 = max(blur[1] + blur[4], 0.0)
     for i in range(BLUR):
-        mean, sd = _BLUR_MEAN[i], _BLUR_SD[i]
+        mean, sd = BLUR_MEAN[i], BLUR_SD[i]
         if i == 2 or i == 5:
             sd = 0.02 + 0.4 * np.sqrt(motion2)
         elif geometry == 4 and i > 2:
@@ -194,22 +222,6 @@ def _kept_positive(
         value[geometry + at] = -blur[at]
         step = solve_fixed(total, rhs, fixed, value)
     return step
-
-
-@jit
-def _diagonalised(blur: FloatArray, turn_rad: float, turning: bool) -> float:
-    """Turn the blur's axes so that M12 vanishes; the new angle."""
-    blur[0], blur[1], blur[4] = max(blur[0], 0.0), max(blur[1], 0.0), max(blur[4], 0.0)
-    if not turning:
-        return turn_rad
-    by = 0.5 * np.arctan2(2.0 * blur[3], blur[1] - blur[4])
-    c, sn = np.cos(by), np.sin(by)
-    m1, m12, m2, h1, h2 = blur[1], blur[3], blur[4], blur[2], blur[5]
-    blur[1] = max(c * c * m1 + 2.0 * c * sn * m12 + sn * sn * m2, 0.0)
-    blur[4] = max(sn * sn * m1 - 2.0 * c * sn * m12 + c * c * m2, 0.0)
-    blur[3] = 0.0
-    blur[2], blur[5] = c * h1 + sn * h2, c * h2 - sn * h1
-    return float(turn_rad + by)
 
 
 @jit
