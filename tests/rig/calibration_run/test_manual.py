@@ -101,7 +101,7 @@ def test_keys_move_and_take_pictures_until_there_is_enough(
             terminal.wait_for(rf"moved \({key}\)")
         terminal.press("c")
         terminal.wait_for(rf"captured: pose {number}\b")
-    terminal.wait_for(r"there: .*right tilted nearer")
+    terminal.wait_for(r"there: .*left tilted nearer.*rolled clockwise")
     terminal.press("q")
     code, out, said = terminal.finish()
     assert code == 0, said
