@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from estimator.ideal import ideal_response, rms_vs_ideal, time_to_within
 from rig.config import RigConfig
 from rig.efficiency import radius_bound_m
+from rig.paper_observer import observer_chi
 from rig.run_data import ArmTrack, RunData, UpdateTrack
 
 FloatArray = NDArray[np.float64]
@@ -29,13 +30,26 @@ class Analysis:
     target_axis: FloatArray | None  # (3,) in the base frame, cylinder only
     radius_true_m: float | None
     z: FloatArray | None  # (k,) 1/R - chi, 1/m
-    z_ideal: FloatArray | None  # (k,)
-    rms_vs_ideal: float | None  # of |z(0)|
+    z_observer: FloatArray | None  # (k,) of the paper's observer; z itself where that one ran
+    z_ideal: FloatArray | None  # (k,) what (5) promises of z_observer
+    rms_vs_ideal: float | None  # of z_observer, as a share of |z(0)|
     time_to_1pct_s: float | None  # also None when it was never reached for good
     relative_error: float | None
     chi_std: FloatArray | None  # (k,) as stated, 1/m
     nees: float | None  # (z / chi_std)² at the end
     radius_bound_m: float | None  # the least standard deviation of R at the end
+
+    @property
+    def other_than_observer(self) -> bool:
+        """Whether z_observer is there beside the estimator that the run was made with."""
+        return self.z_observer is not None and self.z_observer is not self.z
+
+    @property
+    def deviation(self) -> FloatArray | None:
+        """(k,) of the observer from the ideal response, as a share of |z(0)|."""
+        if self.z_observer is None or self.z_ideal is None or self.z_observer[0] == 0.0:
+            return None
+        return (self.z_observer - self.z_ideal) / abs(float(self.z_observer[0]))
 
 
 def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> Analysis:
@@ -47,15 +61,20 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
     sigma2 = _sigma2(arm, updates)
     t_s = updates.t_s - start_s
     motion_t_s = arm.t_s - start_s
-    z = z_ideal = rms = to_1pct = relative = None
+    z = z_observer = z_ideal = rms = to_1pct = relative = None
     with np.errstate(divide="ignore"):
         radius_m = 1.0 / updates.chi
     if radius_true_m is not None and len(t_s) > 1:
         z = 1.0 / radius_true_m - updates.chi
-        if config.estimator.kind == "observer":  # no other estimator promises (5)
-            z_ideal = _ideal(motion_t_s, sigma2, config, float(z[0]), t_s)
-            if z[0] != 0.0:  # a perfect guess leaves no transient to compare
-                rms = rms_vs_ideal(t_s, z, z_ideal)
+        z_observer = z
+        if config.estimator.chosen != "observer":  # no other promises (5)
+            chi = observer_chi(data, config.estimator)
+            z_observer = None if chi is None else 1.0 / radius_true_m - chi
+        gains = config.estimator.gains(data.target)
+        if z_observer is not None:
+            z_ideal = _ideal(motion_t_s, sigma2, gains, float(z_observer[0]), t_s)
+            if z_observer[0] != 0.0:  # a perfect guess leaves no transient to compare
+                rms = rms_vs_ideal(t_s, z_observer, z_ideal)
         relative_errors = radius_m / radius_true_m - 1.0
         to_1pct = time_to_within(t_s, relative_errors, 0.01)
         relative = float(relative_errors[-1])
@@ -73,6 +92,7 @@ def analyse(data: RunData, config: RigConfig, radius_true_m: float | None) -> An
         target_axis=target_axis,
         radius_true_m=radius_true_m,
         z=z,
+        z_observer=z_observer,
         z_ideal=z_ideal,
         rms_vs_ideal=rms,
         time_to_1pct_s=to_1pct,
@@ -99,15 +119,18 @@ def _nees(z: FloatArray | None, updates: UpdateTrack) -> float | None:
 
 
 def _ideal(
-    motion_t_s: FloatArray, sigma2: FloatArray, config: RigConfig, z0: float, at_s: FloatArray
+    motion_t_s: FloatArray,
+    sigma2: FloatArray,
+    gains: tuple[float, float],
+    z0: float,
+    at_s: FloatArray,
 ) -> FloatArray:
     """The response (5) to the measured motion, starting with z0 at the first image (t = 0)."""
     inside = (motion_t_s > 0.0) & (motion_t_s < at_s[-1])
     ends = np.interp([0.0, at_s[-1]], motion_t_s, sigma2)
     times = np.concatenate(([0.0], motion_t_s[inside], at_s[-1:]))
     squares = np.concatenate((ends[:1], sigma2[inside], ends[1:]))
-    gains = config.estimator
-    return ideal_response(times, squares, gains.alpha, gains.damping, z0, at_s)
+    return ideal_response(times, squares, *gains, z0, at_s)
 
 
 def _sigma2(arm: ArmTrack, updates: UpdateTrack) -> FloatArray:

@@ -14,17 +14,22 @@ from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
 
+_PAPER_ALPHA: dict[TargetKind, float] = {"sphere": 2000.0, "cylinder": 500.0}
+
 
 class EstimatorConfig(Section):
     """Which estimator, its first guess, and what it needs to know."""
 
-    # The last four are there to compare with.
+    # auto: kalman, but the observer where one of its gains is given. The last four are there to
+    # compare with.
     kind: Literal[
-        "observer", "kalman", "batch", "triangulation", "limb_plane", "limb_plane_ekf"
-    ] = "observer"
-    # Of the observer.
-    alpha: Annotated[float, Field(gt=0, le=1e6)] = 2000.0
-    damping: Annotated[float, Field(gt=0, le=20)] = 1.0  # multiple of c* = 2 sqrt(alpha) sigma
+        "auto", "kalman", "observer", "batch", "triangulation", "limb_plane", "limb_plane_ekf"
+    ] = "auto"
+    # Of the observer; left out: the paper's for the target, 2000 for a sphere and 500 for a
+    # cylinder.
+    alpha: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    # Of the observer, a multiple of c* = 2 sqrt(alpha) sigma; left out: 1.
+    damping: Annotated[float, Field(gt=0, le=20)] | None = None
     radius_guess_m: Annotated[float, Field(gt=0, le=10)] = 0.03
     # The range that the radius is sure to lie in; left out: a third to three times the guess.
     radius_range_m: tuple[Positive, Positive] | None = None
@@ -45,9 +50,33 @@ class EstimatorConfig(Section):
         return self
 
     @property
+    def gains_given(self) -> bool:
+        """Whether the configuration says how fast the observer is to be."""
+        return self.alpha is not None or self.damping is not None
+
+    @property
+    def chosen(self) -> str:
+        """The kind itself, or what ``auto`` stands for."""
+        if self.kind != "auto":
+            return self.kind
+        return "observer" if self.gains_given else "kalman"
+
+    @property
     def states_variance(self) -> bool:
         """Whether the chosen estimator says how sure it is."""
-        return self.kind in ("kalman", "batch", "limb_plane_ekf")
+        return self.chosen in ("kalman", "batch", "limb_plane_ekf")
+
+    @property
+    def why_observer(self) -> str:
+        """For messages: what made ``auto`` the observer; "" where nothing did."""
+        if self.kind != "auto" or not self.gains_given:
+            return ""
+        return " (estimator.alpha and estimator.damping are the observer's and chose it)"
+
+    def gains(self, target: TargetKind) -> tuple[float, float]:
+        """The observer's alpha and damping for a target."""
+        alpha = _PAPER_ALPHA[target] if self.alpha is None else self.alpha
+        return alpha, 1.0 if self.damping is None else self.damping
 
     @property
     def radius_range(self) -> tuple[float, float]:
@@ -115,11 +144,12 @@ class RigConfig(Section):
             raise ValueError(
                 "run.until_share (--until) needs an estimator that states how sure it is: "
                 "set estimator.kind=kalman; the observer has run.until_converged"
+                f"{self.estimator.why_observer}"
             )
-        if self.motion.policy == "information" and self.estimator.kind != "kalman":
+        if self.motion.policy == "information" and self.estimator.chosen != "kalman":
             raise ValueError(
                 "motion.policy = information needs an estimator that states how sure it is: "
-                "set estimator.kind=kalman"
+                f"set estimator.kind=kalman{self.estimator.why_observer}"
             )
         if self.arm.hold_s <= 1.0 / self.run.control_rate_hz:
             raise ValueError(

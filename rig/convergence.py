@@ -36,7 +36,7 @@ class Convergence(Protocol):
 
 def make_convergence(config: RigConfig, data: RunData) -> Convergence:
     """What fits the configured estimator: its stated interval, or its predicted transient."""
-    if config.estimator.kind == "observer":
+    if config.estimator.chosen == "observer":
         return TransientConvergence(config, data)
     return IntervalConvergence(config, data)
 
@@ -81,7 +81,7 @@ class TransientConvergence:
     """
 
     def __init__(self, config: RigConfig, data: RunData) -> None:
-        self._estimator = config.estimator
+        self._alpha, self._damping = config.estimator.gains(data.target)
         self._fraction = config.run.converged_fraction
         self._data = data
         self._used = 0
@@ -107,8 +107,8 @@ class TransientConvergence:
         return bool(np.ptp(recent) <= self._fraction * abs(last.chi))
 
     def _advance(self, duration_s: float, sigma2: float) -> None:
-        alpha = self._estimator.alpha
-        c = damping_rates(np.array(np.sqrt(sigma2)), alpha, self._estimator.damping)
+        alpha = self._alpha
+        c = damping_rates(np.array(np.sqrt(sigma2)), alpha, self._damping)
         step = exact_step(alpha, np.array(sigma2), c, np.array(duration_s))
         z, w = self._z, self._w
         self._z = float(step.zz * z + step.zw * w)

@@ -36,7 +36,7 @@ class LiveStatus:
     overruns: int
     speed_m_s: float  # measured, of the camera
     limited_by: tuple[str, ...]
-    remaining_fraction: float  # predicted rest of the observer's transient
+    remaining_fraction: float  # of the observer's transient, or of R half the 95 % interval
     late_s: float  # by which the newest tick began after its point on the grid
     arm: ArmState | None  # its newest sample
     sighting: Sighting | None  # the newest image and what was measured in it

@@ -190,19 +190,20 @@ def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
     """The estimator that the configuration asks for; ConfigError where the target has none such."""
     chosen = config.estimator
     model: Model = Sphere() if target == "sphere" else Cylinder()
-    if chosen.kind in ("limb_plane", "limb_plane_ekf"):
+    kind = chosen.chosen
+    if kind in ("limb_plane", "limb_plane_ekf"):
         if target != "sphere":
-            raise ConfigError(f"estimator.kind = {chosen.kind} is for spheres: choose another")
+            raise ConfigError(f"estimator.kind = {kind} is for spheres: choose another")
         model = LimbPlane()
-    if chosen.kind in ("observer", "limb_plane"):
-        return Observer(model, chosen.alpha, chosen.damping, chosen.radius_guess_m)
-    if chosen.kind == "triangulation":
+    if kind in ("observer", "limb_plane"):
+        return Observer(model, *chosen.gains(target), chosen.radius_guess_m)
+    if kind == "triangulation":
         return Triangulation(model, chosen.radius_guess_m)
     prior = RadiusPrior(chosen.radius_guess_m, *chosen.radius_range)
-    if chosen.kind == "batch":
+    if kind == "batch":
         return BatchLeastSquares(model, prior)
     noise = TwistNoise(chosen.twist_std_m_s, chosen.twist_std_rad_s)
-    if chosen.kind == "limb_plane_ekf":
+    if kind == "limb_plane_ekf":
         return ExtendedKalmanFilter(model, prior, noise)
     return KalmanFilter(model, prior, noise, chosen.time_std_s)
 

@@ -15,6 +15,7 @@ from rig.records import Json
 # What `rig run --json` prints, in this order; summary.json holds more.
 JSON_KEYS = (
     "target",
+    "estimator",
     "radius_m",
     "radius_true_m",
     "relative_error",
@@ -65,6 +66,7 @@ def summarise(
     run_s = outcome.ended_s - outcome.started_s
     return {
         "target": target,
+        "estimator": config.estimator.chosen,
         "radius_m": radius_m,
         "radius_true_m": analysis.radius_true_m,
         "relative_error": None if radius_m is None else analysis.relative_error,
@@ -116,13 +118,13 @@ def table(summary: Mapping[str, Json]) -> Table:
     if isinstance(position, list):
         where = " ".join(_number(value, "{:.4f}") for value in position) + " m (base)"
     for name, value in [
+        ("estimator", str(summary["estimator"])),
         ("radius", _radius(summary)),
         ("true radius", _number(summary["radius_true_m"], "{:.4f} mm", 1e3)),
         ("relative error", _number(summary["relative_error"], "{:+.3f} %", 1e2)),
         ("the calibration limits it to", _limits(summary)),
         ("position", where),
-        ("rms from the ideal response", _number(summary["rms_vs_ideal"], "{:.3f} % of z(0)", 1e2)),
-        ("transient left", _number(summary["transient_left"], "{:.2f} %", 1e2)),
+        *_progress(summary),
         ("time to stay within ± 1 %", _number(summary["time_to_1pct_s"], "{:.2f} s")),
         (
             "frames",
@@ -143,6 +145,20 @@ def table(summary: Mapping[str, Json]) -> Table:
     ]:
         out.add_row(name, value)
     return out
+
+
+def _progress(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
+    """How far the estimate came, and how the paper's observer went along or would have."""
+    rms = _number(summary["rms_vs_ideal"], "{:.3f} % of z(0)", 1e2)
+    left = _number(summary["transient_left"], "{:.3f} %", 1e2)
+    stated = summary["radius_std_m"] is not None
+    return [
+        ("95 % interval", f"± {left}") if stated else ("transient left", left),
+        (
+            "rms from the ideal response",
+            rms if summary["estimator"] == "observer" else f"{rms} (the paper's observer)",
+        ),
+    ]
 
 
 def _log(summary: Mapping[str, Json]) -> str:

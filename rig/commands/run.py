@@ -100,6 +100,7 @@ def run(
     config, source = calibrated(loaded, uncalibrated)
     calibration = None if uncalibrated else calibration_in_use(loaded)
     warn(f"calibration: {source}")
+    warn(f"estimator: {_estimator(config)}")
     address = page_address(view_host, view_port, view_token) if view else None
     run_dir = make_run_dir(out, target)
     console = Console(stderr=as_json)
@@ -122,10 +123,20 @@ def run(
                 write_reports([read_run(run_dir)], run_dir)
         except (OSError, ConfigError) as error:  # what was measured stands all the same
             warn(f"warning: {run_dir} is not complete: {error}")
-    _explain(result, config.estimator.kind == "observer")
+    _explain(result, config.estimator.chosen == "observer")
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
         raise typer.Exit(code)
+
+
+def _estimator(config: "RigConfig") -> str:
+    """Which estimator was chosen and, where that may surprise, why."""
+    section = config.estimator
+    if section.why_observer:
+        return f"observer{section.why_observer}; estimator.kind=kalman chooses the Kalman filter"
+    if section.gains_given and section.chosen not in ("observer", "limb_plane"):
+        return f"{section.chosen}; estimator.alpha and estimator.damping serve rms_vs_ideal only"
+    return section.chosen
 
 
 def _share(text: str) -> float:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.image.feature import Feature
 from rig.log.reader import Log
 from rig.recorded.pictures import IMAGE_KINDS, loader
 from rig.recorded.record import Command, FrameEntry, Picture, RunRecord
@@ -37,6 +38,7 @@ def read_run(run_dir: Path) -> RunRecord:
         elif isinstance(step, Estimated) and step.kind == "update":
             data.updates.append(step.estimate)
     config = recording.config()
+    data.features = _features(data, seen, config.calibration.latency_s)
     commands, pictures = _rest(recording.log, seen, config.calibration.latency_s)
     return RunRecord(
         directory=run_dir,
@@ -79,6 +81,17 @@ def _rest(
             feature = sighting.measurement.feature
             pictures.append(Picture(t_s, feature, loader(log, record)))
     return tuple(commands), tuple(pictures)
+
+
+def _features(data: RunData, seen: list[Seen], stamps_late_s: float) -> list[Feature]:
+    """What each update was made from: the feature that was exposed at its very instant."""
+    exposed = {
+        one.sighting.frame.t_exposure_mid_s - stamps_late_s: one.sighting.measurement.feature
+        for one in seen
+    }
+    found = [exposed.get(update.t_s) for update in data.updates]
+    features = [feature for feature in found if feature is not None]
+    return features if len(features) == len(found) else []
 
 
 def _frame(seen: Seen) -> FrameEntry:

@@ -116,13 +116,21 @@ def _true_radius(true_mm: float) -> list[Json]:
 
 
 def _transient(runs: Sequence[Shown]) -> Figure:
-    """z(t) with the response (5) promises, as in figs. 3a, 4, 5c; χ̂ where truth is unknown."""
+    """z(t) with the response (5) promises, as in figs. 3a, 4, 5c; χ̂ where truth is unknown.
+
+    Beside another estimator than the paper's stands what the paper's would have said.
+    """
     known = all(run.analysis.z is not None for run in runs)
     data: list[Json] = []
     for run in runs:
         analysis = run.analysis
         z = analysis.z if known and analysis.z is not None else analysis.chi
         data.append(curve(run, analysis.t_s, z, unit="1/m"))
+        if known and analysis.z_observer is not None and analysis.other_than_observer:
+            name = f"{run.name}: the paper's observer"
+            observer = curve(run, analysis.t_s, analysis.z_observer, unit="1/m", name=name)
+            grey: dict[str, Json] = {"color": run.colour, "dash": "dot", "width": 1.2}
+            data.append({**observer, "line": grey})
         if known and analysis.z_ideal is not None:
             ideal = curve(run, analysis.t_s, analysis.z_ideal, unit="1/m")
             line: dict[str, Json] = {"color": IDEAL, "dash": "dash", "width": 1}
@@ -135,10 +143,9 @@ def _transient(runs: Sequence[Shown]) -> Figure:
 def _deviation(runs: Sequence[Shown]) -> Figure:
     data: list[Json] = []
     for run in runs:
-        a = run.analysis
-        if a.z is None or a.z_ideal is None or len(a.z) == 0 or a.z[0] == 0.0:
-            continue
-        data.append(curve(run, a.t_s, 100 * (a.z - a.z_ideal) / abs(a.z[0]), unit="%"))
+        share = run.analysis.deviation
+        if share is not None:
+            data.append(curve(run, run.analysis.t_s, 100.0 * share, unit="%"))
     return {"data": data, "layout": layout("deviation from the ideal response", "[% of z(0)]")}
 
 

@@ -13,19 +13,30 @@ from estimator.image.outline import outline_px
 from rig.analysis import Analysis
 from rig.recorded.record import Picture
 
-MEASURED, IDEAL = "#1f5fa8", "black"
+MEASURED, OBSERVER, IDEAL = "#1f5fa8", "#8a8f98", "black"
 _AXIS_SHOWN_M = 0.12  # half the length drawn of a cylinder's axis
 
 
 def draw_transient(
     axes: Axes, analysis: Analysis, label: str = "z", colour: str = MEASURED
 ) -> None:
-    """The estimation error z(t) = 1/R − χ̂ with the response (5) promises, as in figs. 3a, 4, 5c."""
+    """The estimation error z(t) = 1/R − χ̂ with the response (5) promises, as in figs. 3a, 4, 5c.
+
+    Another estimator than the paper's is drawn with two of its standard deviations, and with what
+    the paper's would have said.
+    """
     if analysis.z is None:
         axes.plot(analysis.t_s, analysis.chi, color=colour, label="χ̂" if label == "z" else label)
         axes.set(title="estimate χ̂ (true radius unknown)", xlabel="t [s]", ylabel="χ̂ [1/m]")
         return
     axes.plot(analysis.t_s, analysis.z, color=colour, label=label)
+    if analysis.z_observer is not None and analysis.other_than_observer:
+        axes.plot(analysis.t_s, analysis.z_observer, color=OBSERVER, label="the paper's observer")
+    if analysis.chi_std is not None:
+        limits = axes.get_ylim()  # the prior's band would leave no room for the rest
+        low, high = analysis.z - 2.0 * analysis.chi_std, analysis.z + 2.0 * analysis.chi_std
+        axes.fill_between(analysis.t_s, low, high, color=colour, alpha=0.2, linewidth=0)
+        axes.set_ylim(*limits)
     if analysis.z_ideal is not None:
         axes.plot(analysis.t_s, analysis.z_ideal, "--", color=IDEAL, linewidth=1)
     axes.axhline(0.0, color="grey", linewidth=0.5)
@@ -37,9 +48,10 @@ def draw_transient(
 def draw_deviation(
     axes: Axes, analysis: Analysis, label: str = "z", colour: str = MEASURED
 ) -> None:
-    """How far z is from the ideal response, in per cent of z(0)."""
-    if analysis.z is not None and analysis.z_ideal is not None and len(analysis.z):
-        share = 100 * (analysis.z - analysis.z_ideal) / abs(analysis.z[0])
+    """How far the paper's observer is from the ideal response, in per cent of z(0)."""
+    share = analysis.deviation
+    if share is not None:
+        share = 100.0 * share
         axes.plot(analysis.t_s, share, color=colour, label=label, linewidth=1)
         axes.legend()
     axes.set(title="deviation from the ideal response", xlabel="t [s]", ylabel="[% of z(0)]")

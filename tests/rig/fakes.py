@@ -169,8 +169,9 @@ def make_bench(
     stop_requested: Callable[[SimulatedClock], bool] = lambda clock: False,
     on_tick: Callable[[LiveStatus], None] = lambda status: None,
 ) -> Bench:
-    """The default sphere configuration around the fakes; the camera is the tool."""
-    config = load_config("sphere", None, ["log.images=off", *(assignments or [])])
+    """The paper's observer of a sphere around the fakes; the camera is the tool."""
+    settings = ["log.images=off", "estimator.kind=observer", *(assignments or [])]
+    config = load_config("sphere", None, settings)
     clock = SimulatedClock()
     arm = KinematicArm(clock)
     vision = ExactVision(clock, arm)

@@ -17,9 +17,44 @@ def error_of(*assignments: str, target: str = "sphere") -> str:
 
 def test_the_default_rig_uses_the_papers_gains_for_each_target() -> None:
     sphere, cylinder = load_config("sphere"), load_config("cylinder")
-    assert sphere.estimator.alpha == 2000.0
-    assert cylinder.estimator.alpha == 500.0
+    assert sphere.estimator.gains("sphere") == (2000.0, 1.0)
+    assert cylinder.estimator.gains("cylinder") == (500.0, 1.0)
     assert cylinder.motion.policy == "paper"
+
+
+@pytest.mark.parametrize(
+    ("assignments", "chosen"),
+    [
+        ((), "kalman"),
+        (("estimator.radius_guess_m=0.02",), "kalman"),
+        (("estimator.alpha=8000",), "observer"),
+        (("estimator.damping=0.5",), "observer"),
+        (("estimator.alpha=8000", "estimator.kind=kalman"), "kalman"),
+        (("estimator.kind=observer",), "observer"),
+        (("estimator.kind=batch",), "batch"),
+    ],
+)
+def test_the_filter_is_the_default_and_the_observers_gains_choose_the_observer(
+    assignments: tuple[str, ...], chosen: str
+) -> None:
+    assert load_config("sphere", None, list(assignments)).estimator.chosen == chosen
+
+
+def test_gains_in_a_rig_file_choose_the_observer_too(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("estimator: {damping: 2.0}\n")
+    for target in ("sphere", "cylinder"):
+        config = load_config(target, path)  # type: ignore[arg-type]
+        assert config.estimator.chosen == "observer"
+        assert load_config(target, path, ["estimator.kind=kalman"]).estimator.chosen == "kalman"  # type: ignore[arg-type]
+    assert config.estimator.gains("cylinder") == (500.0, 2.0)
+
+
+@pytest.mark.parametrize("wish", ["run.until_share=0.005", "motion.policy=information"])
+def test_what_needs_the_filter_says_that_a_gain_has_chosen_the_observer(wish: str) -> None:
+    message = error_of(wish, "estimator.alpha=2000")
+    assert "estimator.kind=kalman" in message
+    assert "estimator.alpha" in message
 
 
 @pytest.mark.parametrize(

@@ -54,11 +54,27 @@ def test_two_runs_are_overlaid_on_one_page_without_network(tmp_path: Path) -> No
     assert len(times) == len([entry for entry in log if entry["kind"] == "event"])
 
 
-def test_what_no_run_has_anything_for_is_left_out(tmp_path: Path) -> None:
+def figures_of(run: Path) -> dict:
+    page = (run / "report.html").read_text()
+    return json.loads(page.rpartition("const figures = ")[2].partition(";\n")[0])
+
+
+def test_a_filters_run_shows_its_interval_and_what_the_observer_would_have_said(
+    tmp_path: Path,
+) -> None:
     summary = record(tmp_path / "run", "--set", "estimator.kind=kalman")
-    page = (tmp_path / "run" / "report.html").read_text()
-    figures = json.loads(page.rpartition("const figures = ")[2].partition(";\n")[0])
-    assert set(figures) == FIGURES - {"deviation"}  # only the observer promises a response
+    figures = figures_of(tmp_path / "run")
+    assert set(figures) == FIGURES
+    names = [line["name"] for line in figures["transient"]["data"]]
+    assert any("observer" in name for name in names)
     bounds = figures["radius"]["data"][:2]
     assert [len(bound["y"]) for bound in bounds] == [len(figures["radius"]["data"][2]["y"])] * 2
-    assert f"{1e3 * summary['radius_std_m']:.4f}" in page
+    assert f"{1e3 * summary['radius_std_m']:.4f}" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_what_no_run_has_anything_for_is_left_out(tmp_path: Path) -> None:
+    record(tmp_path / "run", "--no-report")
+    setup = tmp_path / "run" / "setup.json"
+    setup.write_text(json.dumps({**json.loads(setup.read_text()), "radius_true_m": None}))
+    assert rig("report", str(tmp_path / "run")).exit_code == 0
+    assert set(figures_of(tmp_path / "run")) == FIGURES - {"deviation"}  # nothing to compare with
