@@ -37,6 +37,8 @@ class Estimate:
     extrapolated_s: float = 0.0  # how far the arm's motion was extrapolated to get here
     covariance: FloatArray | None = None  # (4, 4) of (s, chi), where it is known
     image_covariance: FloatArray | None = None  # (3, 3) of s as the last image showed it
+    state: FloatArray | None = None  # (m,) the model's s, from estimators of any model
+    unknowns: FloatArray | None = None  # (p,) all of the model's χ, the same
     doubt: str = ""  # why the images and the motion do not go together, if they do not
 
     @property

@@ -1,4 +1,4 @@
-"""An extended Kalman filter on the unknowns of any model of form (1), for comparison."""
+"""An extended Kalman filter on the unknowns of any model of form (1): for points, to compare."""
 
 from collections.abc import Callable
 
@@ -23,14 +23,20 @@ _FINEST = 1e-7
 class ExtendedKalmanFilter:
     """State (s, χ) of a model, moved on by (1) and linearised by differences.
 
-    An image is the P0 / R that it shows; the model says what that is at a state. Only for models
-    without an axis. With the sphere's own model it is the linear filter, with ``LimbPlane`` the
-    textbook's on three unknowns. No image is refused and nothing is learnt from residuals.
+    An image is the s that its feature holds; the model says what that is at a state. Only for
+    models without an axis. With the sphere's own model it is the linear filter, with
+    ``LimbPlane`` the textbook's on three unknowns; for points, whose χ̇ has χ², it is what there
+    is instead of an exact one. ``independent`` says that each unknown is as uncertain as
+    ``prior`` on its own (several points), not all of them together (one target's). No image is
+    refused and nothing is learnt from residuals.
     """
 
-    def __init__(self, model: Model, prior: RadiusPrior, noise: TwistNoise) -> None:
+    def __init__(
+        self, model: Model, prior: RadiusPrior, noise: TwistNoise, independent: bool = False
+    ) -> None:
         self._model = model
         self._prior = prior
+        self._independent = independent
         self._noise = noise.covariance
         self._t_s = 0.0
         self._x: FloatArray | None = None  # (m + p,)
@@ -50,7 +56,8 @@ class ExtendedKalmanFilter:
             return Correction.RESTARTED
         x, P, _ = self._moved(t_s, motion)
         H = _differences(self._seen, x)
-        covariance = feature.covariance + (_FINEST * np.linalg.norm(feature.s)) ** 2 * np.eye(3)
+        floor = (_FINEST * float(np.linalg.norm(feature.s))) ** 2
+        covariance = feature.covariance + floor * np.eye(feature.s.size)
         innovation = feature.s - self._seen(x)
         gain = np.linalg.solve(H @ P @ H.T + covariance, H @ P).T
         left = np.eye(x.size) - gain @ H
@@ -76,14 +83,17 @@ class ExtendedKalmanFilter:
     def _begin(self, feature: Feature, t_s: float, inverse: float, variance: float) -> None:
         s = self._model.measured(feature, None)
         chi = self._model.chi_of_guess(s, 1.0 / inverse)
-        # From P0 / R to the model's s, and from 1/R to χ, which is in proportion to it.
-        J = _differences(lambda position: self._model.measured(Feature(position, np.eye(3)), None),
-                         np.array(feature.s, dtype=float))  # fmt: skip
+        # From what the feature holds to the model's s, from 1/R to χ, which is in proportion to it.
+        J = _differences(
+            lambda seen: self._model.measured(Feature(seen, feature.covariance), None),
+            np.array(feature.s, dtype=float),
+        )
+        spread = np.diag(chi**2) if self._independent else np.outer(chi, chi)
         m = s.size
         self._x, self._t_s = np.concatenate((s, chi)), t_s
         self._P = np.zeros((self._x.size, self._x.size))
         self._P[:m, :m] = J @ feature.covariance @ J.T
-        self._P[m:, m:] = variance * np.outer(chi, chi) / inverse**2
+        self._P[m:, m:] = variance * spread / inverse**2
         self._P += np.diag((_FINEST * self._x) ** 2 + 1e-18)
 
     def _moved(self, t_s: float, motion: TwistHistory) -> tuple[FloatArray, FloatArray, float]:
@@ -110,7 +120,7 @@ class ExtendedKalmanFilter:
         return np.concatenate((s_dot, model.f_u(s, chi, u)))
 
     def _seen(self, x: FloatArray) -> FloatArray:
-        return self._model.position_and_axis(x[: self._model.m])[0]
+        return self._model.shown(x[: self._model.m])
 
     def _answer(self, x: FloatArray, P: FloatArray, t_s: float, extrapolated_s: float) -> Estimate:
         m = self._model.m
@@ -119,8 +129,12 @@ class ExtendedKalmanFilter:
         )  # fmt: skip
         inverse = self._model.inverse_radius(x[:m], x[m:])
         variance = float((g @ P @ g.T)[0, 0])
-        position = self._seen(x)
-        return Estimate(t_s, position, None, inverse, variance, self._residual, extrapolated_s)
+        position, _ = self._model.position_and_axis(x[:m])
+        return Estimate(
+            *(t_s, position, None, inverse, variance, self._residual, extrapolated_s),
+            state=x[:m].copy(),
+            unknowns=x[m:].copy(),
+        )
 
 
 def _differences(

@@ -129,7 +129,11 @@ class Observer:
         residual = 0.0 if state is None else state.residual
         position, axis = self._model.position_and_axis(s)
         inverse = self._model.inverse_radius(s, chi)
-        return Estimate(t_s, position.copy(), axis, inverse, None, residual, extrapolated_s)
+        return Estimate(
+            *(t_s, position.copy(), axis, inverse, None, residual, extrapolated_s),
+            state=s.copy(),
+            unknowns=chi.copy(),
+        )
 
     def _error_after(
         self, interval: _Interval, state: _State

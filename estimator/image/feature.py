@@ -14,11 +14,12 @@ class Feature:
 
     Sphere: P0 is the centre. Cylinder: P0 is the axis point closest to the camera's centre
     (eq. 16) and ``axis`` the unit direction a, with aᵀs = 0; its sign is arbitrary but kept
-    from image to image while tracking.
+    from image to image while tracking. Of n points s holds the image coordinates instead, (x, y)
+    of one after the other (2n,).
     """
 
-    s: FloatArray  # (3,)
-    covariance: FloatArray  # (3, 3) of s
+    s: FloatArray  # (3,), or (2n,)
+    covariance: FloatArray  # of s, (3, 3) or (2n, 2n)
     axis: FloatArray | None = None  # (3,), cylinder only
 
 

@@ -36,6 +36,10 @@ class Cylinder:
             axis = -axis
         return np.concatenate((feature.s, axis))
 
+    def shown(self, s: FloatArray) -> FloatArray:
+        """The half of s (6,) that is P0 / R (3,)."""
+        return s[:3]
+
     def position_and_axis(self, s: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """The two halves of s (6,), the axis scaled to unit length."""
         axis: FloatArray = s[3:] / np.linalg.norm(s[3:])

@@ -37,6 +37,10 @@ class LimbPlane:
             raise ValueError("the limb plane is that of a sphere: a cylinder has another")
         return moments_of(feature.s)
 
+    def shown(self, s: FloatArray) -> FloatArray:
+        """P0 / R (3,) of the moments (5,)."""
+        return self.position_and_axis(s)[0]
+
     def position_and_axis(self, s: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """P0 / R (3,) by (10) and (11), the printed n11 squared; and no axis."""
         n20, n11, n02 = s[2], s[3], s[4]

@@ -36,8 +36,15 @@ class Model(Protocol):
         """The measured s (m,) of a feature, free signs chosen so that it lies near ``near``."""
         ...
 
+    def shown(self, s: FloatArray) -> FloatArray:
+        """What ``Feature.s`` is at s (m,): what ``measured`` reads s from."""
+        ...
+
     def position_and_axis(self, s: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """P0 / R (3,) and the axis (3,), if the target has one, out of s (m,)."""
+        """P0 / R (3,) and the axis (3,), if the target has one, out of s (m,).
+
+        R is the length that χ is the inverse of, for points the depth or range of the first.
+        """
         ...
 
     def chi_of_guess(self, s: FloatArray, radius_m: float) -> FloatArray:

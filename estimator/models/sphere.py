@@ -27,6 +27,10 @@ class Sphere:
         """The feature's s (3,)."""
         return np.array(feature.s, dtype=float)
 
+    def shown(self, s: FloatArray) -> FloatArray:
+        """s (3,) itself."""
+        return s
+
     def position_and_axis(self, s: FloatArray) -> tuple[FloatArray, FloatArray | None]:
         """s (3,) itself, and no axis."""
         return s, None

@@ -11,7 +11,6 @@ from estimator.ideal import rms_vs_ideal
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
 from tests.estimator.exact_motion import BALL, Trajectory, lively
-from tests.estimator.point import Point
 from tests.estimator.responses import EXACT, MOTION, REGULAR, ideal, model_of, response
 
 FloatArray = NDArray[np.float64]
@@ -53,15 +52,6 @@ def test_a_sphere_ends_where_it_is_seen(duration_s: float) -> None:
     truth = MOTION.feature(BALL, 0.2 + duration_s).s
     np.testing.assert_allclose(s[0, -1], truth, atol=2e-5)
     np.testing.assert_array_equal(chi[0, :, 0], chi0[0])
-
-
-def test_a_point_and_its_moving_unknown_end_where_they_are() -> None:
-    window = EXACT.window(0.0, 2.0)
-    start, end = (MOTION.feature(BALL, t).s * BALL.radius_m for t in (0.0, 2.0))
-    s0, chi0 = start[:2] / start[2], np.array([1.0 / start[2]])
-    s, chi = integrate(Point(), s0[None], chi0[None], window.times_s, window.twists_camera)
-    np.testing.assert_allclose(s[0, -1], end[:2] / end[2], atol=2e-6)
-    assert chi[0, -1, 0] == pytest.approx(1.0 / end[2], rel=2e-6)
 
 
 def test_an_implausibly_fast_twist_is_an_error_not_a_number() -> None:

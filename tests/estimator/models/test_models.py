@@ -6,8 +6,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.image.feature import Feature
+from estimator.models.bearings import Bearings
 from estimator.models.cylinder import Cylinder
 from estimator.models.model import Model
+from estimator.models.points import Points
 from estimator.models.sphere import Sphere
 from tests.estimator.models.exact_projection import (
     cylinder_lines,
@@ -116,10 +118,10 @@ def test_a_cylinders_axis_is_read_with_the_sign_that_was_tracked() -> None:
         model.measured(Feature(s, np.eye(3)), None)
 
 
-@pytest.mark.parametrize("model", [Sphere(), Cylinder()])
+@pytest.mark.parametrize("model", [Sphere(), Cylinder(), Points(2), Bearings(2)])
 def test_the_compiled_terms_are_those_the_model_states(model: Model) -> None:
     rng = np.random.default_rng(3)
-    m, h = (3 if isinstance(model, Sphere) else 6), 1e-6
+    m, h = model.m, 1e-6
     s, u = rng.standard_normal((4, m)), rng.standard_normal((4, 6))
     chi = rng.standard_normal((4, model.p))
     Omega = model.structures(s, u)
