@@ -28,9 +28,7 @@ def test_points_and_their_depths_change_as_projection_says(model: Model, u: Floa
     )
     rate = model.f_m(s, u) + model.Omega(s, u[:3]).T @ chi
     np.testing.assert_allclose(rate, (after[0] - before[0]) / (2 * STEP), atol=1e-7)
-    np.testing.assert_allclose(
-        model.f_u(s, chi, u), (after[1] - before[1]) / (2 * STEP), atol=1e-7
-    )
+    np.testing.assert_allclose(model.f_u(s, chi, u), (after[1] - before[1]) / (2 * STEP), atol=1e-7)
 
 
 @pytest.mark.parametrize("model", BOTH)

@@ -123,15 +123,15 @@ def test_directories_that_do_not_exist_are_refused(tmp_path: Path) -> None:
     assert rig("runs", str(tmp_path / "nothing")).exit_code == 2
 
 
-def test_an_estimators_own_deviation_goes_before_a_judged_one(
-    recorded: Path, tmp_path: Path
-) -> None:
-    run = read_run(recorded)
+def test_an_estimators_own_deviation_goes_before_a_judged_one(tmp_path: Path) -> None:
+    observed = tmp_path / "observed"
+    record(observed, "--set", "estimator.kind=observer")
+    run = read_run(observed)
     judged = error_bar(run)
     assert judged is not None and judged.meaning == JUDGED
     off_m = abs(run.summary["radius_m"] - run.summary["radius_true_m"])
     assert 0.3 * off_m < judged.plus_minus_m < 10.0 * off_m  # after 1.5 s the guess still shows
-    run_dir = copy_of(recorded, tmp_path / "stated")
+    run_dir = copy_of(observed, tmp_path / "stated")
     summary = {**run.summary, "radius_std_m": 1.5e-5}
     (run_dir / "summary.json").write_text(json.dumps(summary))
     stated = error_bar(read_run(run_dir))
