@@ -1,8 +1,9 @@
-"""The one way a command reaches the arm: limited, given a time to live, recorded."""
+"""The one way a run's commands reach the arm: with what is around it, sent, recorded."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import Clock
 from drivers.interfaces import Arm, ArmState, JointArm
 from estimator.estimate import Estimate
 from rig.deadman import Deadman
@@ -10,29 +11,29 @@ from rig.envelope import Surroundings
 from rig.log.run_log import RunLog
 from rig.run_data import RunData
 from rig.safety import Allowed, Limiter
+from rig.sender import Sender
 
 FloatArray = NDArray[np.float64]
 
 
 class Commander:
-    """Sends tool twists through the limiter; each lives ``hold_s``, guarded by the deadman too."""
+    """Sends tool twists through the limiter and records them."""
 
     def __init__(
         self,
         arm: Arm,
+        clock: Clock,
         limiter: Limiter,
         data: RunData,
         log: RunLog,
         hold_s: float,
         deadman: Deadman | None,
     ) -> None:
-        self._arm = arm
         self._joint_arm: JointArm | None = arm if isinstance(arm, JointArm) else None
         self._limiter = limiter
         self._data = data
         self._log = log
-        self._hold_s = hold_s
-        self._deadman = deadman
+        self._sender = Sender(arm, clock, limiter, hold_s, deadman)
 
     def send(
         self,
@@ -42,11 +43,11 @@ class Commander:
         estimate: Estimate | None,
         dt_s: float,
     ) -> Allowed:
-        """Command what the envelope allows of ``wanted`` (6,), a tool twist; says what that is."""
-        allowed = self._limiter.limit(wanted, self._surroundings(state, estimate), dt_s)
-        self._arm.command_twist(allowed.twist_tool, self._hold_s)
-        if self._deadman is not None:
-            self._deadman.feed()
+        """Command what the envelope allows of ``wanted`` (6,), a tool twist; says what that is.
+
+        ``now_s`` is the tick's instant.
+        """
+        allowed = self._sender.send(wanted, self._surroundings(state, estimate), now_s, dt_s)
         self._log.command(
             now_s, wanted, allowed.twist_tool, state.twist_tool, list(allowed.reasons)
         )

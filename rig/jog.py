@@ -7,17 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.errors import ConfigError, DeviceTimeoutError
+from drivers.errors import ConfigError, DeviceTimeoutError, SafetyError
 from drivers.interfaces import Arm, ArmState, JointArm
 from rig.config_safety import SafetyConfig
-from rig.envelope import Surroundings
+from rig.deadman import Deadman
+from rig.envelope import Envelope, Surroundings
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
+from rig.sender import Sender
 
 FloatArray = NDArray[np.float64]
 
 _RATE_HZ = 100.0
-_HOLD_S = 0.05
+HOLD_S = 0.05  # how long a command lives
+_HELD_UP_S = 0.5  # that long ago nobody wants the motion any more
 _BASELINE_S = 0.15  # of listening at rest, for what counts as motion
 _FIRST_STATE_S = 2.0
 _REST_TIMEOUT_S = 3.0
@@ -54,15 +57,20 @@ def jog(
     duration_s: float,
     safety: SafetyConfig,
     stop_requested: Callable[[], bool],
+    T_tool_camera: FloatArray | None = None,
+    deadman: Deadman | None = None,
 ) -> JogResult:
     """Command ``twist`` (6,) in tool or base axes for ``duration_s``, then stop and watch.
 
-    The arm has been told to stop when this returns or raises. Raises ConfigError for a twist
-    that is no motion, SafetyError and OperateError as limiter and arm do.
+    With ``T_tool_camera`` (4, 4) the camera is kept off the table too; on the wall clock a
+    ``deadman`` guards every command. The arm has been told to stop when this returns or raises.
+    Raises ConfigError for a twist that is no motion, SafetyError where the program was held up
+    or as the limiter does, OperateError as the arm does.
     """
     if twist.shape != (6,) or not np.all(np.isfinite(twist)) or not np.any(twist):
         raise ConfigError(f"a jog needs six finite numbers, not all zero, got {twist.tolist()}")
-    run = _Jog(arm, clock, twist, in_base, safety)
+    limiter = Limiter(safety, Envelope(safety, T_tool_camera))
+    run = _Jog(arm, clock, twist, in_base, limiter, deadman)
     try:
         run.listen()
         interrupted = run.drive(duration_s, stop_requested)
@@ -76,13 +84,20 @@ def jog(
 
 class _Jog:
     def __init__(
-        self, arm: Arm, clock: Clock, twist: FloatArray, in_base: bool, safety: SafetyConfig
+        self,
+        arm: Arm,
+        clock: Clock,
+        twist: FloatArray,
+        in_base: bool,
+        limiter: Limiter,
+        deadman: Deadman | None,
     ) -> None:
         self._arm = arm
         self._clock = clock
         self._twist = twist
         self._in_base = in_base
-        self._limiter = Limiter(safety)
+        self._limiter = limiter
+        self._sender = Sender(arm, clock, limiter, HOLD_S, deadman)
         self._joint_arm: JointArm | None = arm if isinstance(arm, JointArm) else None
         self._states: list[ArmState] = []
         self._allowed = np.zeros(6)
@@ -111,14 +126,18 @@ class _Jog:
             self._limiter.check_state(state, now_s)
             if stop_requested():
                 return True
+            if now_s - last_s > _HELD_UP_S:
+                raise SafetyError(
+                    f"the program was held up for {now_s - last_s:.1f} s and the arm stopped "
+                    "meanwhile: jog again"
+                )
             if now_s - self._first_command_s >= duration_s:
                 break
             wanted = self._twist
             if self._in_base:
                 wanted = _rotate(state.T_base_tool[:3, :3].T, wanted)
             dt_s = min(max(now_s - last_s, 1.0 / _RATE_HZ), 3.0 / _RATE_HZ)
-            allowed = self._limiter.limit(wanted, self._surroundings(state), dt_s)
-            self._arm.command_twist(allowed.twist_tool, _HOLD_S)
+            allowed = self._sender.send(wanted, self._surroundings(state), now_s, dt_s)
             self._allowed = allowed.twist_tool
             self._reasons.update(allowed.reasons)
             last_s = now_s

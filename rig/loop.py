@@ -59,7 +59,7 @@ class RunLoop:
         self._data = data
         self._log = log
         self._stop_requested = stop_requested
-        self._commander = Commander(arm, limiter, data, log, config.arm.hold_s, deadman)
+        self._commander = Commander(arm, clock, limiter, data, log, config.arm.hold_s, deadman)
         self._period_s = 1.0 / config.run.control_rate_hz
         self._tool_from_camera = twist_map(data.T_tool_camera)
         self._watch = Watch(config, fusion, vision)

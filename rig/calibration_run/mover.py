@@ -16,6 +16,7 @@ from rig.deadman import Deadman
 from rig.envelope import Envelope, Surroundings
 from rig.safety import Limiter
 from rig.schedule import TickStats, tick_grid
+from rig.sender import Sender
 
 FloatArray = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ class Mover:
         self._envelope = Envelope(safety, T_tool_camera)
         self._limiter = Limiter(safety, self._envelope)
         self._deadman = deadman
-        self._hold_s = hold_s
+        self._sender = Sender(arm, clock, self._limiter, hold_s, deadman)
         self._stop_requested = stop_requested
         self._speed = speed
         self._gain_per_s = min(_GAIN_PER_S, _DELAY_SHARE / max(safety.reaction_time_s, 1e-3))
@@ -177,19 +178,14 @@ class Mover:
             if wanted is None or now_s - start_s > patience_s:
                 return ""
             dt_s = min(max(now_s - last_s, _PERIOD_S), 3 * _PERIOD_S)
-            if now_s - last_s > self._hold_s:
-                self._limiter.restart()  # the last command has run out meanwhile
-            allowed = self._limiter.limit(wanted, self._surroundings(state), dt_s)
             try:
-                self._arm.command_twist(allowed.twist_tool, self._hold_s)
+                allowed = self._sender.send(wanted, self._surroundings(state), now_s, dt_s)
             except MotionRefusedError as error:
                 self._arm.stop()
                 self._limiter.restart()
                 if np.any(wanted):
                     return str(error)
                 continue  # the ramp to rest was refused: the arm brakes by itself
-            if self._deadman is not None:
-                self._deadman.feed()
             if allowed.blocked:
                 return allowed.blocked
             last_s = now_s

@@ -1,6 +1,7 @@
 """``rig arm``: look at an arm, jog it, stop it, bring it back, home it; no rig file needed."""
 
 import json
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -15,7 +16,7 @@ from rig.exit_codes import ExitCode
 if TYPE_CHECKING:
     from rig.arm_kits import ArmKit
     from rig.config_safety import SafetyConfig
-    from rig.jog import JogResult
+    from rig.jog import FloatArray, JogResult
 
 arm_app = typer.Typer(
     help="Look at an arm, jog it, stop it, bring it back, home it.", no_args_is_help=True
@@ -66,21 +67,29 @@ def jog(
 ) -> None:
     """Move the arm within the limits and report what it did; Ctrl-C stops it.
 
-    With a rig file the arm is set up as there, and the limits are those of its `safety` section;
-    without one, its default speeds and accelerations hold, and no workspace.
+    With a rig file the arm is set up as there, and the limits are those of its `safety` section,
+    the camera's distance to the table included; without one, its default speeds and
+    accelerations hold, and no workspace. Exit status 5 when the program was held up meanwhile.
     """
     from drivers.clock import WallClock
+    from rig.deadman import Deadman
+    from rig.jog import HOLD_S
     from rig.jog import jog as run_jog
     from rig.stop_request import StopRequest
 
     wanted = _numbers(twist)
     kit = _kit(arm, host, port, baud, rig)
     safety = _limits(rig, kit.max_state_age_s)
+    camera = None if rig is None else _camera_on_tool(rig)
     clock = WallClock()
+    in_base = frame == "base"
     with StopRequest() as stop_requested:
         device = kit.open(clock)
         try:
-            result = run_jog(device, clock, wanted, frame == "base", for_s, safety, stop_requested)
+            with closing(Deadman(clock, HOLD_S, device.stop)) as deadman:
+                result = run_jog(
+                    device, clock, wanted, in_base, for_s, safety, stop_requested, camera, deadman
+                )
         finally:
             device.close()
     facts = _jog_facts(result, frame)
@@ -165,6 +174,20 @@ def _limits(rig: Path | None, max_state_age_s: float) -> "SafetyConfig":
         safety = load_config("sphere", rig).safety
     oldest_s = max(safety.max_state_age_s, max_state_age_s)
     return safety.model_copy(update={"max_state_age_s": oldest_s})
+
+
+def _camera_on_tool(rig: Path) -> "FloatArray | None":
+    """T_tool_camera (4, 4), as far as it is known."""
+    from drivers.errors import ConfigError
+    from rig.build import hand_eye_of
+    from rig.calibrated import calibrated
+    from rig.config_load import load_config
+
+    config = load_config("sphere", rig)
+    # What is out of date, or was given to begin with, keeps off the table better than nothing.
+    with suppress(ConfigError):
+        config, _ = calibrated(config)
+    return hand_eye_of(config)
 
 
 def _numbers(text: str) -> Any:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import ConfigError, DeviceTimeoutError, SafetyError
-from rig.config_safety import SafetyConfig
+from rig.config_safety import SafetyConfig, TableConfig
 from rig.jog import jog
 from sim_backend.clock import SimulatedClock
 from sim_backend.config import SimConfig
@@ -66,6 +66,53 @@ def test_an_interruption_stops_at_the_next_tick():
     assert result.interrupted
     assert clock.now_s() < 1.0
     assert arm.stops >= 1
+
+
+class HeldUpArm(KinematicArm):
+    """An arm in a program that is held up for a while during one reading."""
+
+    def __init__(self, clock: SimulatedClock, at_s: float, for_s: float) -> None:
+        super().__init__(clock)
+        self.held = (at_s, for_s)
+
+    def read_states(self):
+        at_s, for_s = self.held
+        if self.clock.now_s() >= at_s:
+            self.held = (np.inf, 0.0)
+            self.clock.sleep_until(self.clock.now_s() + for_s)
+        return super().read_states()
+
+
+def test_a_short_hang_makes_the_motion_ramp_up_again():
+    clock = SimulatedClock()
+    arm = HeldUpArm(clock, 0.8, 0.2)
+    jog(arm, clock, TWIST, False, 2.0, LIMITS, never)
+    after = [twist for t, twist in arm.commands if t >= 0.95]
+    assert not np.any(after[0])  # decided before the hang
+    speeds = [np.linalg.norm(twist[:3]) for twist in after]
+    assert max(np.diff(speeds)) <= 3 * LIMITS.max_linear_acceleration_m_s2 * 0.01 * (1 + 1e-6)
+
+
+def test_a_long_hang_ends_the_jog():
+    clock = SimulatedClock()
+    arm = HeldUpArm(clock, 0.8, 2.0)
+    with pytest.raises(SafetyError, match="held up"):
+        jog(arm, clock, TWIST, False, 5.0, LIMITS, never)
+    assert all(not np.any(twist) for t, twist in arm.commands if t > 0.85)
+    assert arm.stops >= 1
+
+
+def test_the_camera_keeps_off_the_table_where_its_place_is_known():
+    arm, clock = fake()
+    tool_m = arm.pose_at(0.0)[2, 3]
+    table = TableConfig(offset_m=tool_m - 0.2, min_distance_m=0.02)
+    safety = LIMITS.model_copy(update={"table": table})
+    camera = np.eye(4)
+    camera[2, 3] = 0.12  # the tool looks down
+    down = np.array([0.0, 0.0, 0.05, 0.0, 0.0, 0.0])
+    result = jog(arm, clock, down, False, 4.0, safety, never, camera)
+    assert arm.history[-1].T_base_tool[2, 3] - 0.12 > tool_m - 0.2 + 0.015
+    assert any("table (camera)" in reason for reason in result.limited_by)
 
 
 @pytest.mark.parametrize("bad", [np.zeros(6), np.full(6, np.nan), np.zeros(5)])

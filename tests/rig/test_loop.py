@@ -212,6 +212,24 @@ def test_a_loop_held_up_holds_the_arm_and_starts_again_from_rest(tmp_path: Path)
     assert np.linalg.norm(after[1][:3]) <= 2 * limit * 0.01 * (1 + 1e-6)
 
 
+def test_a_tick_held_up_before_its_command_does_not_send_it(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path, ["run.duration_s=3"])
+    poll, hung = bench.vision.poll, []
+
+    def hang():
+        if bench.clock.now_s() > 1.0 and not hung:
+            bench.clock.sleep_until(bench.clock.now_s() + 0.5)
+            hung.append(bench.clock.now_s())
+        return poll()
+
+    bench.vision.poll = hang
+    bench.run()
+    after = [twist for t, twist in bench.arm.commands if t >= hung[0]]
+    assert not np.any(after[0])
+    limit = bench.config.safety.max_linear_acceleration_m_s2
+    assert np.linalg.norm(after[1][:3]) <= 2 * limit * 0.01 * (1 + 1e-6)
+
+
 def test_a_wall_in_the_way_holds_the_arm_and_keeps_the_measurement(tmp_path: Path) -> None:
     bench = make_bench(tmp_path, ["run.duration_s=6", "safety.workspace_min_m=[-0.12,-2,0.05]"])
     outcome = bench.run()
