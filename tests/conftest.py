@@ -1,6 +1,13 @@
 """Real devices by name on the command line; without one its tests are not run."""
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# The same examples every time, and no limits that a busy machine would break.
+settings.register_profile(
+    "repeatable", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("repeatable")
 
 DEVICES = {
     "--ur-host": "a Universal Robots arm that may move 2 cm about where it stands: clear its way",
