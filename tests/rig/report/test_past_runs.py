@@ -17,9 +17,9 @@ from tests.rig.report.recorded_runs import record
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One run and its summary."""
+    """One run of the observer, which states no deviation, and its summary."""
     out = tmp_path_factory.mktemp("runs") / "whole"
-    record(out)
+    record(out, "--set", "estimator.kind=observer")
     return out
 
 
