@@ -20,20 +20,24 @@ FloatArray = NDArray[np.float64]
 # σ1 below this share of what other directions would make of it: v is given a push, as in
 # ``policy``.
 _ESCAPE_SHARE = 0.01
-# Largest product of a gain and an integration step.
-_MAX_GAIN_STEP = 0.1
+# Largest product of a gain and an integration step, and the most steps in one call.
+_MAX_GAIN_STEP = 0.2
+_MOST_STEPS = 20
 # How much faster than the gain itself the climb may change near equal eigenvalues.
 _KINK = 10.0
 
 
 class GradientPolicy:
-    """v̇ = k1 (κ_des − κ) v / ‖v‖² + k2 (I − v vᵀ/‖v‖²)(J_vᵀ − J_v† J_s ṡ), κ = ‖v‖²/2.
+    """v̇ = k1 (κ_des − κ) v / ‖v‖² + k2 (I − v vᵀ/‖v‖²)(J_vᵀ − J_v† min(J_s ṡ, 0)), κ = ‖v‖²/2.
 
-    For points, a limb plane and whatever else has p unknowns; ``PaperPolicy`` is the same for a
-    sphere or a cylinder, compiled. J_v and J_s are those of the smooth σ1² of ``least_sigma2``;
-    ṡ is what the model makes of the newest estimate. Where σ1 vanishes (v towards a point, say)
-    J_v vanishes too, and v is pushed to where the unknown that is lost shows most. Before an
-    estimate with a state v stays as it is.
+    For points, a limb plane and whatever else has p unknowns; ``PaperPolicy`` is the law as
+    printed for a sphere or a cylinder, compiled. J_v and J_s are those of the smooth σ1² of
+    ``least_sigma2``; ṡ is what the model makes of the newest estimate. A ṡ that raises σ1² by
+    itself is not undone, unlike in print: on its way towards a point, the target being
+    centred, the camera would never leave the ray. Where σ1 vanishes (v towards a point, say)
+    J_v vanishes too, and v is pushed to where the unknown that is lost shows most. The maximum
+    is that of the neighbourhood. A k2 too large for the steps of ``advance`` counts as the
+    largest they can follow. Before an estimate with a state v stays as it is.
     Raises ValueError for v0 = 0 or a negative gain.
     """
 
@@ -66,11 +70,13 @@ class GradientPolicy:
             return
         B = structure_by_v(self._model, self._s)
         B_dot = structure_along(self._model, self._s, self._s_dot(self._v, omega))
-        fastest = max(self._k1, _KINK * self._k2 * _largest(B) ** 2, math.hypot(*omega))
-        steps = max(1, math.ceil(dt_s * fastest / _MAX_GAIN_STEP))
+        curving = _KINK * _gain(spectrum(B @ self._v), B) ** 2
+        fastest = max(self._k1, self._k2 * curving, math.hypot(*omega))
+        steps = min(max(1, math.ceil(dt_s * fastest / _MAX_GAIN_STEP)), _MOST_STEPS)
+        k2 = min(self._k2, _MAX_GAIN_STEP * steps / (max(dt_s, 1e-9) * max(curving, 1e-9)))
         for _ in range(steps):
-            half = self._v + 0.5 * dt_s / steps * self._rate(self._v, B, B_dot)
-            self._v = self._v + dt_s / steps * self._rate(half, B, B_dot)
+            half = self._v + 0.5 * dt_s / steps * self._rate(self._v, B, B_dot, k2)
+            self._v = self._v + dt_s / steps * self._rate(half, B, B_dot, k2)
 
     def v_dot(self, v: FloatArray, omega: FloatArray) -> FloatArray:
         """v̇ (3,) at v (3,), in m/s²; ValueError before an estimate with a state."""
@@ -78,33 +84,33 @@ class GradientPolicy:
             raise ValueError("GradientPolicy knows no state of its model yet")
         B = structure_by_v(self._model, self._s)
         B_dot = structure_along(self._model, self._s, self._s_dot(v, omega))
-        return self._rate(v, B, B_dot)
+        return self._rate(v, B, B_dot, self._k2)
 
     def _s_dot(self, v: FloatArray, omega: FloatArray) -> FloatArray:
         assert self._s is not None
         u = np.concatenate((v, omega))
         return self._model.f_m(self._s, u) + self._model.Omega(self._s, v).T @ self._chi
 
-    def _rate(self, v: FloatArray, B: FloatArray, B_dot: FloatArray) -> FloatArray:
+    def _rate(self, v: FloatArray, B: FloatArray, B_dot: FloatArray, k2: float) -> FloatArray:
         square = float(v @ v)
         along = self._k1 * (self._kappa_des - 0.5 * square) / square * v
-        if self._k2 == 0.0:
+        if k2 == 0.0:
             return along
         found = spectrum(B @ v)
         _, J_v = least_sigma2(found, B)
         _, rate = least_sigma2(found, (B_dot @ v)[:, :, None])
         push, edge = _push(found, B, math.sqrt(square))
         # J_v† J_s ṡ, faded out where J_v has no direction.
-        compensation = float(rate[0]) / max(float(np.linalg.norm(J_v)), edge) ** 2 * J_v
+        compensation = min(float(rate[0]), 0.0) / max(float(np.linalg.norm(J_v)), edge) ** 2 * J_v
         ascent = J_v + push - compensation
         across = ascent - (v @ ascent) / square * v
-        rates: FloatArray = along + self._k2 * across
+        rates: FloatArray = along + k2 * across
         return rates
 
 
-def _largest(B: FloatArray) -> float:
-    """The largest σ there is per unit of speed."""
-    return float(np.linalg.norm(B.reshape(-1, 3), 2))
+def _gain(found: Spectrum, B: FloatArray) -> float:
+    """The most that σ1's combination of unknowns shows of itself per unit of speed."""
+    return float(np.linalg.norm(np.tensordot(found.U[:, 0], B, 1), 2))
 
 
 def _push(found: Spectrum, B: FloatArray, speed_m_s: float) -> tuple[FloatArray, float]:

@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 # Eigenvalues nearer to each other than this share of the largest count as equal.
 _EQUAL = 1e-9
 # The power of the mean that stands for the least eigenvalue where a gradient is wanted.
-_SHARPNESS = 8
+_SHARPNESS = 16
 # Of the differences in s, as a share: exact for an Ω of up to fourth degree in s.
 _STEP = 1e-3
 
@@ -85,7 +85,7 @@ def least_sigma2(found: Spectrum, Omega_x: FloatArray) -> tuple[float, FloatArra
     """σ1² made smooth, for climbing, and its gradient (k,) for ∂Ω/∂x (p, m, k).
 
     The least of several eigenvalues has a kink wherever two are equal, and that is where its
-    maximum tends to be. This is their mean of power −8 instead, at most p^(1/8) times the least;
+    maximum tends to be. This is their mean of power −16 instead, at most p^(1/16) times the least;
     it has a gradient everywhere, and for p = 1 it is σ1² itself.
     """
     sigma2 = found.sigma2

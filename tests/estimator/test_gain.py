@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from estimator.gain import H, damping_rates, rest_rates
 from estimator.ideal import ideal_response
+from estimator.models.limb_plane import LimbPlane, moments_of
 
 FloatArray = NDArray[np.float64]
 OmegaOf = Callable[[float], FloatArray]
@@ -108,6 +109,54 @@ def test_constant_omega_with_two_unknowns_decouples_into_eq_5() -> None:
     for eta, square, start in zip(U.T @ z, squares, (1.0, 2.0), strict=True):
         expected = ideal_response([0.0, 2.0], [square, square], ALPHA, 1.0, start, AT)
         np.testing.assert_allclose(eta, expected, atol=1e-6)
+
+
+def limb(v: FloatArray) -> FloatArray:
+    """Ω (3, 5) of a sphere's limb plane, in units that make its σ_i comparable to those above."""
+    scale = np.diag([1.0, 1.0, 30.0, 30.0, 30.0])
+    Omega: FloatArray = LimbPlane().Omega(moments_of(np.array([2.7, -1.9, 6.0])), v) @ scale
+    return Omega
+
+
+@pytest.mark.parametrize("damping", [0.5, 1.0, 2.0])
+def test_a_limb_planes_three_unknowns_decouple_into_eq_5(damping: float) -> None:
+    fixed = limb(np.array([0.1, -0.3, 0.4]))
+    squares, U = np.linalg.eigh(fixed @ fixed.T)
+    assert squares[0] > 1e-3 * squares[1] > 0.0
+    z0 = np.array([1.0, -2.0, 3.0])
+    z = literal_error(lambda t: fixed, U @ z0, damping, lambda t: 0.0 * fixed)
+    for eta, square, start in zip(U.T @ z, squares, z0, strict=True):
+        expected = ideal_response([0.0, 2.0], [square, square], ALPHA, damping, start, AT)
+        np.testing.assert_allclose(eta, expected, atol=1e-5)
+
+
+def test_for_a_constant_omega_h_is_the_published_v_diag_v_t() -> None:
+    """H = V diag(D1, D2) Vᵀ with Ω = U (Σ 0) Vᵀ and D1 = diag(c_i)."""
+    fixed = limb(np.array([0.1, -0.3, 0.4]))
+    _, sigma, Vt = np.linalg.svd(fixed)
+    c = damping_rates(sigma, ALPHA, 0.8)
+    np.testing.assert_allclose(c, 0.8 * 2.0 * np.sqrt(ALPHA) * sigma)
+    expected = Vt.T @ np.diag(np.concatenate((c, [c.max(), c.max()]))) @ Vt
+    np.testing.assert_allclose(H(fixed, 0.0 * fixed, ALPHA, 0.8), expected, rtol=1e-9, atol=1e-9)
+
+
+def test_while_a_limb_plane_moves_its_error_obeys_the_matrix_form_of_eq_5() -> None:
+    """z̈ + C ż + α Ω Ωᵀ z = 0: for p > 1 turning eigenvectors couple the coordinates of (5)."""
+
+    def moving(t_s: float) -> FloatArray:
+        return limb(np.array([0.1 + 0.1 * np.sin(t_s), -0.3 * np.cos(2.0 * t_s), 0.4]))
+
+    z0 = np.array([1.0, -0.5, 0.3])
+    z = literal_error(moving, z0, 1.0, lambda t: derivative(moving, t))
+
+    def rate(t_s: float, y: FloatArray) -> FloatArray:
+        squares, U = np.linalg.eigh(moving(t_s) @ moving(t_s).T)
+        C = (U * damping_rates(np.sqrt(squares), ALPHA, 1.0)) @ U.T
+        return np.concatenate((y[3:], -C @ y[3:] - ALPHA * (U * squares) @ U.T @ y[:3]))
+
+    start = np.concatenate((z0, np.zeros(3)))
+    exact = solve_ivp(rate, (0.0, AT[-1]), start, t_eval=AT, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(z, exact.y[:3], atol=1e-5)
 
 
 def test_h_is_refused_at_rest() -> None:

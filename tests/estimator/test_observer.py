@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from estimator.ideal import ideal_response, rms_vs_ideal
-from estimator.image.feature import Feature
 from estimator.models.sphere import Sphere
 from estimator.observer import Observer
 from estimator.twist_history import TwistHistory
 from tests.estimator.exact_motion import BALL, Target, Trajectory
-from tests.estimator.point import Point, TwoBalls
 from tests.estimator.responses import (
     EXACT,
     MOTION,
@@ -87,49 +84,3 @@ def test_a_camera_that_reverses_keeps_the_response(alpha: float) -> None:
     fine = np.append(np.arange(0.0, stamps[-1], 5e-4), stamps[-1])
     expected = ideal_response(fine, 0.0025 * np.sin(4.0 * fine) ** 2, alpha, 1.0, z[0], stamps)
     assert rms_vs_ideal(stamps, z, expected) < 1e-4
-
-
-def approaching(t_s: float) -> FloatArray:
-    """Towards the target and across: χ = 1/Z grows by a third, Ω follows s."""
-    ramp = min(t_s / 0.2, 1.0)
-    return ramp * np.array([0.05, 0.02 * np.cos(t_s), 0.08, 0.05, 0.1 * np.cos(2.0 * t_s), 0.2])
-
-
-def test_the_framework_takes_a_nonlinear_target_whose_unknown_moves() -> None:
-    """χ̇ ≠ 0: the reference is (3) itself, ż = −α w + f_u(χ) − f_u(χ̂), with the true Ω(t)."""
-    alpha, target, model = 3000.0, Target(np.array([0.03, -0.02, 0.5]), 1.0), Point()
-    motion = Trajectory(approaching, 2.0)
-
-    def truth(t_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        P0, u = motion.feature(target, t_s).s, approaching(t_s)
-        return P0[:2] / P0[2], np.array([1.0 / P0[2]]), u
-
-    def rate(t_s: float, e: FloatArray) -> FloatArray:
-        s, chi, u = truth(t_s)
-        sigma = float(np.linalg.norm(model.Omega(s, u[:3])))
-        g = model.f_u(s, chi, u) - model.f_u(s, chi - e[:1], u)
-        w_dot = -2.0 * np.sqrt(alpha) * sigma * e[1:] + sigma**2 * e[:1]
-        return np.concatenate((-alpha * e[1:] + g, w_dot))
-
-    stamps, history = np.arange(0.0, 2.0, 0.1), motion.history()
-    observer = Observer(model, alpha, 1.0, 0.55)
-    z = []
-    for t_s in stamps:
-        observer.correct(motion.feature(target, t_s), t_s, history)
-        assert observer.estimate is not None
-        z.append(float(truth(t_s)[1][0]) - observer.estimate.chi)
-    exact = solve_ivp(rate, (0.0, stamps[-1]), [z[0], 0.0], t_eval=stamps, rtol=1e-8, atol=1e-11)
-    assert rms_vs_ideal(stamps, z, exact.y[0]) < 4e-4
-
-
-def test_the_framework_takes_several_unknowns_each_with_its_own_response() -> None:
-    second = Target(np.array([0.1, 0.05, 0.35]), 0.03)
-    observer = Observer(TwoBalls(), 2000.0, 1.0, 1.5 * BALL.radius_m)
-    z = []
-    for t_s in REGULAR:
-        s = np.concatenate((MOTION.feature(BALL, t_s).s, MOTION.feature(second, t_s).s))
-        observer.correct(Feature(s, np.eye(3)), t_s, EXACT)
-        assert observer.estimate is not None
-        z.append(1.0 / BALL.radius_m - observer.estimate.chi)
-    expected = ideal(BALL, 2000.0, 1.0, z[0], REGULAR)
-    assert rms_vs_ideal(REGULAR, z, expected) < 5e-5
