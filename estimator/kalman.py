@@ -84,11 +84,16 @@ class KalmanFilter:
     as much less certain as the target may have moved in it meanwhile.
 
     Slower than 1 mm/s the camera counts as standing and its images tell nothing new of χ.
+    Raises ValueError for a model with other unknowns than a constant 1/R, such as points.
     """
 
     def __init__(
         self, model: Model, prior: RadiusPrior, noise: TwistNoise, time_std_s: float = 0.0
     ) -> None:
+        if model.p != 1 or np.any(model.f_u(np.ones(model.m), np.ones(model.p), np.ones(6))):
+            raise ValueError(
+                "the Kalman filter is for one constant unknown: take an ExtendedKalmanFilter"
+            )
         self._model = model
         self._prior = prior
         self._time_std_s = time_std_s

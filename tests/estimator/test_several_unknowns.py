@@ -12,8 +12,10 @@ from estimator.estimate import Estimate, Estimator
 from estimator.extended import ExtendedKalmanFilter
 from estimator.ideal import ideal_response, rms_vs_ideal
 from estimator.image.feature import Feature
-from estimator.kalman import RadiusPrior, TwistNoise
+from estimator.kalman import KalmanFilter, RadiusPrior, TwistNoise
 from estimator.models.bearings import Bearings
+from estimator.models.limb_plane import LimbPlane
+from estimator.models.model import Model
 from estimator.models.points import Points
 from estimator.observer import Observer
 from tests.estimator.closed_points import drive
@@ -149,3 +151,9 @@ def test_the_extended_filter_says_how_sure_it_is_of_a_depth() -> None:
         assert estimate is not None and estimate.variance is not None
         squares.append((estimate.chi - chi) ** 2 / estimate.variance)
     assert 0.7 < np.mean(squares) < 1.4  # 95 % of such means of 60 are within 0.67 and 1.39
+
+
+@pytest.mark.parametrize("model", [Points(1), Bearings(1), LimbPlane(), TwoBalls()])
+def test_the_exact_filter_refuses_unknowns_it_is_not_exact_for(model: Model) -> None:
+    with pytest.raises(ValueError, match="ExtendedKalmanFilter"):
+        KalmanFilter(model, DEPTHS, QUIET)
