@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rig.commands.options import AsJson, RigFile
+from rig.commands.options import AsJson
 from rig.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -26,9 +26,16 @@ _FAR_M = 100.0
 ArmName = Annotated[
     Literal["ur", "grbl", "sim"], typer.Option("--arm", help="The kind of arm.", show_default=False)
 ]
-Host = Annotated[str | None, typer.Option(help="UR: the controller's address.")]
-Port = Annotated[str | None, typer.Option(help="Gantry: the serial device.")]
-Baud = Annotated[int | None, typer.Option(help="Gantry: the serial speed.")]
+Host = Annotated[str | None, typer.Option(help="UR: the controller's address; no default.")]
+Port = Annotated[str | None, typer.Option(help="Gantry: the serial device; no default.")]
+Baud = Annotated[
+    int | None, typer.Option(help="Gantry: the serial speed in bit/s; default: 115200.")
+]
+# As ``RigFile``, but a jog without one takes the arm as it comes.
+JogRigFile = Annotated[
+    Path | None,
+    typer.Option("--rig", help="The rig's YAML file; default: none, the arm's own limits."),
+]
 
 
 @arm_app.command()
@@ -54,15 +61,16 @@ def jog(
         str, typer.Option(help="vx,vy,vz,wx,wy,wz in m/s and rad/s.", show_default=False)
     ],
     for_s: Annotated[
-        float, typer.Option("--for", min=0.05, max=60.0, help="Seconds.", show_default=False)
+        float,
+        typer.Option("--for", min=0.05, max=60.0, help="Seconds to move.", show_default=False),
     ],
     frame: Annotated[
-        Literal["base", "tool"], typer.Option(help="Axes of the twist; it is the tool's.")
+        Literal["base", "tool"], typer.Option(help="The axes that the tool's twist is given in.")
     ] = "base",
     host: Host = None,
     port: Port = None,
     baud: Baud = None,
-    rig: RigFile = None,
+    rig: JogRigFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Move the arm within the limits and report what it did; Ctrl-C stops it.

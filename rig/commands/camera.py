@@ -25,6 +25,9 @@ camera_app = typer.Typer(
     rich_markup_mode=None,
 )
 
+# What --size, --fps, --fourcc and --exposure-ms leave alone when they are not given.
+_AS_IT_IS = "default: as the camera has it."
+
 SourceOption = Annotated[
     str | None,
     typer.Option(
@@ -33,11 +36,19 @@ SourceOption = Annotated[
         "folder or glob; default: the only camera connected.",
     ),
 ]
-Size = Annotated[str | None, typer.Option(metavar="WxH", help="Ask for this size.")]
-Fps = Annotated[float | None, typer.Option(min=0.1, max=1000.0, help="Ask for this rate.")]
-Fourcc = Annotated[str | None, typer.Option(help="Ask for this format, such as YUYV or MJPG.")]
+Size = Annotated[
+    str | None, typer.Option(metavar="WxH", help=f"Ask for this size in px; {_AS_IT_IS}")
+]
+Fps = Annotated[
+    float | None,
+    typer.Option(min=0.1, max=1000.0, help=f"Ask for so many images a second; {_AS_IT_IS}"),
+]
+Fourcc = Annotated[
+    str | None, typer.Option(help=f"Ask for this format, such as YUYV or MJPG; {_AS_IT_IS}")
+]
 Exposure = Annotated[
-    float | None, typer.Option("--exposure-ms", min=0.01, help="Fix the exposure time.")
+    float | None,
+    typer.Option("--exposure-ms", min=0.01, help=f"Fix the exposure time, in ms; {_AS_IT_IS}"),
 ]
 _ALL_REQUESTS = (
     "fourcc", "size", "rate", "exposure", "gain", "focus", "white_balance", "power_line",
@@ -77,7 +88,9 @@ def list_cameras(source: SourceOption = None, as_json: AsJson = False) -> None:
 @camera_app.command()
 def show(
     source: SourceOption = None,
-    save: Annotated[Path | None, typer.Option(help="Write the picture to this file.")] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write the picture to this file; default: nowhere.")
+    ] = None,
     size: Size = None,
     fps: Fps = None,
     fourcc: Fourcc = None,
@@ -115,7 +128,7 @@ def show(
 def check(
     source: SourceOption = None,
     seconds: Annotated[
-        float, typer.Option("--for", min=0.2, max=3600.0, help="How long to read.")
+        float, typer.Option("--for", min=0.2, max=3600.0, help="Seconds to read.")
     ] = 5.0,
     size: Size = None,
     fps: Fps = None,

@@ -39,7 +39,10 @@ def compare(
     as_json: AsJson = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="Results, figure; the same again goes on where it was stopped."),
+        typer.Option(
+            help="Where results and figure go, the same again goes on where it was stopped; "
+            "default: a new one below runs/."
+        ),
     ] = None,
 ) -> None:
     """Compare estimators and camera motions on the simulated rig: a table, a figure, parquet."""

@@ -24,19 +24,29 @@ RigFile = Annotated[
 ]
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override one configuration key; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override one key of the rig file, as estimator.alpha=5000; repeatable.",
+    ),
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of the simulated rig (sim.seed).")]
+Seed = Annotated[
+    int | None,
+    typer.Option(help="Seed of the simulated rig; default: the rig file's sim.seed."),
+]
 ViewPort = Annotated[
     int | None,
     typer.Option(min=1, max=65535, help="The page's port; default: 8080, or a free one."),
 ]
 ViewHost = Annotated[
     str | None,
-    typer.Option(help="Serve the page at another address than 127.0.0.1; needs --view-token."),
+    typer.Option(help="The page's address; default: 127.0.0.1. Any other needs --view-token."),
 ]
 ViewToken = Annotated[
-    str | None, typer.Option(help="What whoever opens the page has to know: letters and digits.")
+    str | None,
+    typer.Option(
+        help="What whoever opens the page has to know: letters and digits; default: nothing."
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="JSON on stdout, everything else on stderr.")]
 

@@ -27,7 +27,10 @@ def replay(
     ] = "features",
     sweep: Annotated[
         str | None,
-        typer.Option(metavar="KEY=V1,V2,...", help="Replay once for each value: a table, a plot."),
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Replay once for each value: a table, a plot; default: once, as it was recorded.",
+        ),
     ] = None,
     plot: Annotated[
         Path | None,

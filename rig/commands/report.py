@@ -44,7 +44,7 @@ def report(
 
 def runs(
     folder: Annotated[
-        Path, typer.Argument(help="Where run directories lie.", show_default=False)
+        Path, typer.Argument(help="Where run directories lie; default: runs.", show_default=False)
     ] = Path("runs"),
     as_json: AsJson = False,
 ) -> None:

@@ -38,7 +38,10 @@ def run(
     assignments: Assignments = None,
     duration: Annotated[
         float | None,
-        typer.Option(help="Seconds from the first image used to the end (run.duration_s)."),
+        typer.Option(
+            help="Seconds from the first image used to the end; default: the rig file's "
+            "run.duration_s."
+        ),
     ] = None,
     until_converged: Annotated[
         bool, typer.Option("--until-converged", help="End as soon as the estimate has settled.")
@@ -46,7 +49,9 @@ def run(
     until: Annotated[
         str | None,
         typer.Option(
-            metavar="SHARE", help="End when the 95 % interval of R is within ± this, as 0.5%."
+            metavar="SHARE",
+            help="End when the 95 % interval of R is within ± this, as 0.5%; default: the rig "
+            "file's run.until_share, none.",
         ),
     ] = None,
     realtime: Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from rig.commands.options import Assignments, RigFile, warn
+from rig.commands.options import Assignments, warn
 
 sim_app = typer.Typer(
     help="An emulated rig behind the real protocols, to try the true drivers on.",
@@ -41,9 +41,13 @@ def serve(
     ] = 3600.0,
     ur_version: Annotated[
         str | None,
-        typer.Option(help="The UR controller's software version; 3.… is a CB3, 125 Hz."),
+        typer.Option(
+            help="The UR controller's software version; 3.… is a CB3, 125 Hz; default: 5.15."
+        ),
     ] = None,
-    rig: RigFile = None,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="The rig's YAML file; default: the arm's own.")
+    ] = None,
     assignments: Assignments = None,
 ) -> None:
     """Serve an emulated arm, and its camera, in real time until Ctrl-C.
