@@ -12,6 +12,7 @@ EstimatorKind = Literal[
 ]
 PolicyKind = Literal["constant", "paper", "information", "circle"]
 NoiseKind = Literal["clean", "hard", "laggy", "lossy"]
+StartKind = Literal["default", "axial", "along", "near", "far"]
 
 # What each condition lays over the rig, whether images are drawn or not.
 CONDITIONS: dict[NoiseKind, tuple[str, ...]] = {
@@ -32,12 +33,31 @@ CONDITIONS: dict[NoiseKind, tuple[str, ...]] = {
     "lossy": ("sim.camera.drop_probability=0.3", "sim.features.lost_probability=0.1"),
 }
 
+# From where and which way the camera first goes: as the rig file has it, along the optical axis,
+# along the cylinder's axis (which tells nothing), or from another distance.
+STARTS: dict[TargetKind, dict[StartKind, tuple[str, ...]]] = {
+    "sphere": {
+        "default": (),
+        "axial": ("motion.velocity_m_s=[0, 0, 0.05]",),
+        "near": ("sim.sphere.start.distance_m=0.14",),
+        "far": ("sim.sphere.start.distance_m=0.6",),
+    },
+    "cylinder": {
+        "default": (),
+        "axial": ("motion.velocity_m_s=[0, 0, 0.0714]",),
+        "along": ("motion.velocity_m_s=[0.0357, 0.0618, 0]",),
+        "near": ("sim.cylinder.start.distance_m=0.25",),
+        "far": ("sim.cylinder.start.distance_m=0.9",),
+    },
+}
+
 
 @dataclass(frozen=True, slots=True, order=True)
 class Case:
     """One run."""
 
     target: TargetKind
+    start: StartKind
     noise: NoiseKind
     policy: PolicyKind
     estimator: EstimatorKind
@@ -47,6 +67,7 @@ class Case:
     def assignments(self) -> list[str]:
         """What is laid over the configuration."""
         return [
+            *STARTS[self.target][self.start],
             *CONDITIONS[self.noise],
             f"motion.policy={self.policy}",
             f"estimator.kind={self.estimator}",
@@ -60,11 +81,21 @@ def cases_of(
     policies: Sequence[PolicyKind],
     noises: Sequence[NoiseKind],
     seeds: int,
+    starts: Sequence[StartKind] = ("default",),
 ) -> list[Case]:
-    """All combinations that go together: moving for information needs the filter."""
+    """All combinations that go together: moving for information needs the filter.
+
+    Raises ValueError for a start that the target does not have.
+    """
+    for start in starts:
+        if start not in STARTS[target]:
+            known = ", ".join(STARTS[target])
+            raise ValueError(f"--starts {start}: a {target} has {known}")
     return [
-        Case(target, noise, policy, estimator, seed)
-        for noise, policy, estimator, seed in product(noises, policies, estimators, range(seeds))
+        Case(target, start, noise, policy, estimator, seed)
+        for start, noise, policy, estimator, seed in product(
+            starts, noises, policies, estimators, range(seeds)
+        )
         if policy != "information" or estimator == "kalman"
     ]
 

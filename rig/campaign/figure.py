@@ -25,26 +25,28 @@ _COLOURS = {
 
 
 def draw_campaign(path: Path, target: str, rows: Sequence[Row]) -> None:
-    """Draw a column of panels per condition into ``path`` (PNG)."""
-    noises = list(dict.fromkeys(str(row["noise"]) for row in rows))
+    """Draw a column of panels per start and condition into ``path`` (PNG)."""
+    names = list(dict.fromkeys((str(row["start"]), str(row["noise"])) for row in rows))
     figure, axes = plt.subplots(
         2,
-        len(noises),
-        figsize=(max(7.0, 5.2 * len(noises)), 8.4),
+        len(names),
+        figsize=(max(7.0, 5.2 * len(names)), 8.4),
         squeeze=False,
         layout="constrained",
     )
     figure.suptitle(f"{target}: estimators and camera motions")
-    for column, noise in enumerate(noises):
-        these = [row for row in rows if row["noise"] == noise and row["course"]]
-        _courses(axes[0, column], noise, these)
+    for column, (start, noise) in enumerate(names):
+        these = [
+            row for row in rows if (row["start"], row["noise"]) == (start, noise) and row["course"]
+        ]
+        _courses(axes[0, column], noise if start == "default" else f"{start}, {noise}", these)
         _times(axes[1, column], these)
     axes[0, 0].legend(fontsize=8)
     figure.savefig(path, dpi=90)
     plt.close(figure)
 
 
-def _courses(axes: Axes, noise: str, rows: Sequence[Row]) -> None:
+def _courses(axes: Axes, title: str, rows: Sequence[Row]) -> None:
     """The median of |error| over time."""
     for name, group in _groups(rows).items():
         courses = [row["course"] for row in group]
@@ -63,7 +65,7 @@ def _courses(axes: Axes, noise: str, rows: Sequence[Row]) -> None:
             label=f"{estimator}, {policy}",
         )
     axes.axhline(1.0, color="grey", linewidth=0.7)
-    axes.set(title=noise, xlabel="t [s]", ylabel="median |error of R| [%]", ylim=(1e-3, 200))
+    axes.set(title=title, xlabel="t [s]", ylabel="median |error of R| [%]", ylim=(1e-3, 200))
 
 
 def _times(axes: Axes, rows: Sequence[Row]) -> None:

@@ -13,7 +13,7 @@ from rig.campaign.worker import Row
 
 RESULTS_NAME = "results.parquet"
 _SETTINGS_NAME = "campaign.json"
-_KEY = ("target", "noise", "policy", "estimator", "seed")
+_KEY = ("target", "start", "noise", "policy", "estimator", "seed")
 
 
 class Store:
@@ -31,15 +31,23 @@ class Store:
             self.rows: list[Row] = self._read() if self._path.exists() else []
         except OSError as error:
             raise ConfigError(f"cannot use the directory {directory}: {error}") from error
+        self._done = {_key_of_row(row) for row in self.rows}
 
     def missing(self, cases: Sequence[Case]) -> list[Case]:
         """Those that have no row yet."""
-        done = {tuple(row[name] for name in _KEY) for row in self.rows}
-        return [c for c in cases if (c.target, c.noise, c.policy, c.estimator, c.seed) not in done]
+        return [case for case in cases if _key_of(case) not in self._done]
+
+    def rows_of(self, cases: Sequence[Case]) -> list[Row]:
+        """What there is of ``cases``; the store may hold those of other calls as well."""
+        wanted = {_key_of(case) for case in cases}
+        return [row for row in self.rows if _key_of_row(row) in wanted]
 
     def add(self, row: Row) -> None:
-        """Keep a row in memory."""
-        self.rows.append(row)
+        """Keep a row in memory, unless there is one of that run."""
+        key = _key_of_row(row)
+        if key not in self._done:
+            self._done.add(key)
+            self.rows.append(row)
 
     def write(self) -> None:
         """Replace the file in one step: a kill leaves the old one or the new one."""
@@ -79,6 +87,15 @@ class Store:
         )
 
 
+def _key_of(case: Case) -> tuple[object, ...]:
+    """What tells a case's row from all others."""
+    return tuple(getattr(case, name) for name in _KEY)
+
+
+def _key_of_row(row: Row) -> tuple[object, ...]:
+    return tuple(row[name] for name in _KEY)
+
+
 def _check_settings(path: Path, settings: dict[str, object]) -> None:
     """Rows of different settings must not end up in one table."""
     text = json.dumps(settings, indent=2, sort_keys=True)
@@ -86,7 +103,8 @@ def _check_settings(path: Path, settings: dict[str, object]) -> None:
         path.write_text(text + "\n", encoding="utf-8")
     elif path.read_text(encoding="utf-8").strip() != text:
         raise ConfigError(
-            f"{path} is of a campaign with other settings: choose another --out, or repeat that one"
+            f"{path} is of a campaign with other settings, or of another version of the program: "
+            "choose another --out"
         )
 
 

@@ -12,13 +12,14 @@ from rig.campaign.worker import Row
 from rig.records import Json
 
 FloatArray = NDArray[np.float64]
-Group = tuple[str, str, str]  # noise, policy, estimator
+Group = tuple[str, str, str, str]  # start, noise, policy, estimator
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
     """What the runs of one group come to; None where a figure is not known of any."""
 
+    start: str
     noise: str
     policy: str
     estimator: str
@@ -40,7 +41,10 @@ def lines_of(rows: Sequence[Row]) -> list[Line]:
     """One line per group, in the order of names."""
     groups: dict[Group, list[Row]] = {}
     for row in rows:
-        key = (str(row["noise"]), str(row["policy"]), str(row["estimator"]))
+        start, noise, policy, estimator = (
+            str(row[name]) for name in ("start", "noise", "policy", "estimator")
+        )
+        key = (start, noise, policy, estimator)
         groups.setdefault(key, []).append(row)
     return [_line(key, groups[key]) for key in sorted(groups)]
 
@@ -53,14 +57,16 @@ def records_of(lines: Sequence[Line]) -> list[Json]:
 def table_of(target: str, lines: Sequence[Line]) -> Table:
     """The lines for a reader."""
     out = Table(
-        *("condition", "motion", "estimator", "runs", "to 1 % [s]", "90 %", "rms error [%]"),
-        *("NEES", "covered", "rms / bound", "path [m]", "lost", "doubted"),
+        *("start", "condition", "motion", "estimator", "runs", "to 1 % [s]", "90 %"),
+        *("rms error [%]", "NEES", "covered", "rms / bound", "path [m]", "lost", "doubted"),
         title=target,
     )
+    for column in out.columns[:4]:
+        column.no_wrap = True
     for line in lines:
         nees = _text(line.nees, "{:.2f}") + ("" if line.consistent in (True, None) else " !")
         out.add_row(
-            *(line.noise, line.policy, line.estimator),
+            *(line.start, line.noise, line.policy, line.estimator),
             str(line.runs) + (f" ({line.failed} failed)" if line.failed else ""),
             *(_text(line.time_to_1pct_s, "{:.2f}"), _text(line.time_to_1pct_90_s, "{:.2f}")),
             _text(line.rms_error, "{:.4f}", 100.0),

@@ -1,15 +1,16 @@
-"""One run of a comparison, in a process of its own: from a case to a row of figures."""
+"""One run of a comparison, in a process of its own: from a job to a row of figures."""
 
-import signal
 import tempfile
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 from drivers.errors import RigError
 from rig.analysis import Analysis
-from rig.campaign.cases import Case
-from rig.config_load import load_config
+from rig.campaign.job import Job
+from rig.campaign.sources import sources_here
+from rig.config_load import configured
 from rig.live import QuietView
 from rig.run import RunResult, execute
 
@@ -22,23 +23,29 @@ Value = float | int | str | bool | list[float] | None
 Row = dict[str, Value]
 
 
-def ignore_interrupts() -> None:
-    """Ctrl-C is the parent's to handle."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class OtherSourcesError(Exception):
+    """Whoever asks has another version of the program than whoever works."""
 
 
-def run_case(case: Case, rig_file: Path | None, assignments: tuple[str, ...]) -> Row:
-    """Run a case; a run that fails is a row as well, with its error."""
+def run_case(job: Job) -> Row:
+    """Run a job's case; a run that fails is a row as well, with its error.
+
+    Raises OtherSourcesError where this program is not the one that asks.
+    """
+    if job.sources != sources_here():
+        raise OtherSourcesError(f"{sources_here()} at work, {job.sources} asking")
+    case = job.case
     row: Row = {
         "target": case.target,
+        "start": case.start,
         "noise": case.noise,
         "policy": case.policy,
         "estimator": case.estimator,
         "seed": case.seed,
     }
-    settings = [*case.assignments, "log.images=off", *assignments]
+    settings = [*case.assignments, "log.images=off", *job.assignments]
     try:
-        config = load_config(case.target, rig_file, settings)
+        config = configured(yaml.safe_load(job.rig), settings, "the configuration")
         with tempfile.TemporaryDirectory(prefix="activerig-") as run_dir:
             result = execute(config, case.target, Path(run_dir), False, QuietView(), lambda: False)
     except RigError as error:

@@ -13,9 +13,12 @@ import pytest
 from drivers.errors import ConfigError
 from rig.campaign.cases import Case, NoiseKind, cases_of, chosen
 from rig.campaign.figure import draw_campaign
+from rig.campaign.job import Job
+from rig.campaign.sources import sources_here
 from rig.campaign.store import RESULTS_NAME, Store
 from rig.campaign.table import lines_of, table_of
-from rig.campaign.worker import Row, run_case
+from rig.campaign.worker import OtherSourcesError, Row, run_case
+from rig.config_load import dump_config, load_config
 from tests.rig.command_line import rig
 
 pytest.importorskip("pyarrow", reason="the extra parquet is not installed")
@@ -26,6 +29,7 @@ def row(seed: int, error: float | None, time_s: float | None = 0.2, **other: obj
     found = error is not None
     made: Row = {
         "target": "sphere",
+        "start": "default",
         "noise": "clean",
         "policy": "paper",
         "estimator": "kalman",
@@ -75,11 +79,13 @@ def test_a_line_sums_up_its_runs_and_says_what_failed() -> None:
 
 
 def test_a_store_keeps_rows_and_knows_what_is_missing(tmp_path: Path) -> None:
-    cases = [Case("sphere", "clean", "paper", "kalman", seed) for seed in range(3)]
+    cases = [Case("sphere", "default", "clean", "paper", "kalman", seed) for seed in range(3)]
     store = Store(tmp_path, {"a": 1})
     assert store.missing(cases) == cases
     store.add(row(0, 1e-3))
     store.add(row(2, None, None))
+    store.add(row(2, 5e-3))  # once is enough
+    assert len(store.rows) == 2
     store.write()
     again = Store(tmp_path, {"a": 1})
     assert again.rows == store.rows
@@ -99,13 +105,18 @@ def test_a_figure_is_drawn_of_whatever_there_is(tmp_path: Path) -> None:
 
 
 def test_a_run_becomes_a_row_and_a_failed_run_too(tmp_path: Path) -> None:
-    case = Case("sphere", "clean", "constant", "kalman", 3)
-    good = run_case(case, None, ("sim.level=features", "run.duration_s=0.6"))
+    case = Case("sphere", "default", "clean", "constant", "kalman", 3)
+    plain = dump_config(load_config("sphere"))
+    short = ("sim.level=features", "run.duration_s=0.6")
+    good = run_case(Job(case, plain, short, sources_here()))
     assert good["error"] == "" and abs(float(str(good["relative_error"]))) < 5e-3
     course = good["course"]
     assert isinstance(course, list) and 11 <= len(course) <= 13
-    bad = run_case(case, None, ("sim.level=features", "safety.workspace_min_m=[-2, -2, 1.5]"))
+    outside = (*short, "safety.workspace_min_m=[-2, -2, 1.5]")
+    bad = run_case(Job(case, plain, outside, sources_here()))
     assert "workspace" in str(bad["error"]) and bad["relative_error"] is None
+    with pytest.raises(OtherSourcesError, match=r"0\.0 asking"):
+        run_case(Job(case, plain, short, "0.0"))
 
 
 @pytest.mark.parametrize(
@@ -114,6 +125,10 @@ def test_a_run_becomes_a_row_and_a_failed_run_too(tmp_path: Path) -> None:
         (("--noise", "loud"), "clean, hard"),
         (("--estimators", "observer", "--policies", "information"), "kalman"),
         (("--set", "motion.speed=1"), "motion.speed"),
+        (("--starts", "sideways"), "default, axial"),
+        (("--starts", "along"), "a sphere has"),
+        (("--scheduler", "localhost:8786"), "tcp://HOST:PORT"),
+        (("--scheduler", "tcp://127.0.0.1:9", "--jobs", "2"), "--jobs"),
     ],
 )
 def test_wrong_usage_is_refused_before_anything_runs(
@@ -144,7 +159,8 @@ def test_a_killed_campaign_goes_on_and_loses_and_doubles_nothing(tmp_path: Path)
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
-    assert results.exists()
+    done = len(Store(tmp_path, json.loads((tmp_path / "campaign.json").read_text())).rows)
+    assert 0 < done < 30
     again = subprocess.run(command, capture_output=True, text=True, check=True)
     lines = json.loads(again.stdout)
     assert [(line["policy"], line["runs"]) for line in lines] == [("circle", 15), ("constant", 15)]
