@@ -50,6 +50,7 @@ class Joints:
     linear: tuple[bool, ...]  # whether each is a slide
     # Maps q (n,) to J (6, n): twist_tool = J q̇, in the tool's own axes.
     jacobian: Callable[[FloatArray], FloatArray]
+    fastest: FloatArray | None = None  # (n,) m/s or rad/s at most, None where nobody knows
 
 
 class Camera(Protocol):

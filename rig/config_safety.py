@@ -57,6 +57,9 @@ class SafetyConfig(Section):
     joint_margin_rad: NotNegative = 0.03
     joint_margin_m: NotNegative = 0.005
     min_singular_value: NotNegative = 0.02
+    # Share of their greatest speeds, where these are known: next to a singularity a slow tool
+    # takes fast joints, and a joint asked for more than it can do is a protective stop.
+    joint_speed_share: Annotated[float, Field(gt=0, le=1)] = 0.5
     # Time from a command to the arm's obeying it: walls are approached that much slower.
     reaction_time_s: Annotated[float, Field(ge=0, le=1)] = 0.03
     # No image for this many of the camera's periods: something is wrong with it.

@@ -6,7 +6,7 @@ up. The limiter slows a twist until no barrier is approached faster than allowed
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +62,19 @@ class Barrier(NamedTuple):
         return sqrt(late * late + 2.0 * deceleration_m_s2 * room) - late
 
 
+class SpeedLimit(NamedTuple):
+    """A joint's greatest speed: nothing to keep away from, only to be slower than."""
+
+    name: str
+    most: float  # m/s or rad/s
+    closing: float  # the joint's speed under the twist in question
+    room: float = inf
+
+    def allowed_closing(self, deceleration_m_s2: float, reaction_time_s: float) -> float:
+        """The greatest speed."""
+        return self.most
+
+
 class Envelope:
     """The configured barriers of one rig.
 
@@ -81,7 +94,9 @@ class Envelope:
         self._intrinsics = intrinsics
         self._planes: FloatArray | None = None
 
-    def barriers(self, twist_tool: FloatArray, around: Surroundings) -> Iterator[Barrier]:
+    def barriers(
+        self, twist_tool: FloatArray, around: Surroundings
+    ) -> Iterator[Barrier | SpeedLimit]:
         """The barriers on the side ``twist_tool`` (6,) goes to, with what it would do to them."""
         yield from self._workspace(twist_tool, around.state)
         yield from self._table(twist_tool, around.state)
@@ -148,7 +163,7 @@ class Envelope:
             closing = (before[k] - after[k]) / _LOOK_AHEAD_S
             yield Barrier(f"field of view {side}", float(before[k]), float(closing), False)
 
-    def _joints(self, twist: FloatArray, joints: Joints) -> Iterator[Barrier]:
+    def _joints(self, twist: FloatArray, joints: Joints) -> Iterator[Barrier | SpeedLimit]:
         config, J = self._config, joints.jacobian(joints.q)
         scaled = _WEIGHTS[:, None] * J
         normal = scaled.T @ scaled
@@ -161,6 +176,9 @@ class Envelope:
                 yield Barrier(f"joint {name} min", to_low[k] - margin, -rate, False)
             else:
                 yield Barrier(f"joint {name} max", to_high[k] - margin, rate, False)
+            if joints.fastest is not None:
+                most = config.joint_speed_share * float(joints.fastest[k])
+                yield SpeedLimit(f"joint {name} speed", most, abs(rate))
         room = _smallest_singular_value(scaled) - config.min_singular_value
         fastest = float(np.abs(qd).max())
         if _STEEPEST * fastest < _APPROACH_PER_S * room:

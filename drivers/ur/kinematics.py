@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 _TWISTS_RAD = (pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0)  # α of every model
 _RANGE_RAD = 2.0 * pi  # to both sides; an installation may allow less
+# As the data sheets have them; the wrists of some models are faster.
+_FASTEST_RAD_S = (pi,) * 6
+_FASTEST_LARGE_RAD_S = (2 * pi / 3, 2 * pi / 3, 5 * pi / 6, pi, pi, pi)
 
 # An arm's own calibration differs from the published values by a few millimetres.
 _SAME_M = 0.015
@@ -27,18 +30,19 @@ class Model:
     name: str
     a_m: tuple[float, float]  # of the upper arm and the forearm; zero elsewhere
     d_m: tuple[float, float, float, float]  # of joints 1, 4, 5 and 6; zero elsewhere
+    fastest_rad_s: tuple[float, ...] = _FASTEST_RAD_S
 
 
 MODELS = (
     Model("UR3", (-0.24365, -0.21325), (0.1519, 0.11235, 0.08535, 0.0819)),
     Model("UR5", (-0.425, -0.39225), (0.089159, 0.10915, 0.09465, 0.0823)),
-    Model("UR10", (-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922)),
+    Model("UR10", (-0.612, -0.5723), (0.1273, 0.163941, 0.1157, 0.0922), _FASTEST_LARGE_RAD_S),
     Model("UR3e", (-0.24355, -0.2132), (0.15185, 0.13105, 0.08535, 0.0921)),
     Model("UR5e", (-0.425, -0.3922), (0.1625, 0.1333, 0.0997, 0.0996)),
-    Model("UR10e", (-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655)),
-    Model("UR16e", (-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655)),
-    Model("UR20", (-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543)),
-    Model("UR30", (-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543)),
+    Model("UR10e", (-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655), _FASTEST_LARGE_RAD_S),
+    Model("UR16e", (-0.4784, -0.36), (0.1807, 0.17415, 0.11985, 0.11655), _FASTEST_LARGE_RAD_S),
+    Model("UR20", (-0.862, -0.7287), (0.2363, 0.201, 0.1593, 0.1543), _FASTEST_LARGE_RAD_S),
+    Model("UR30", (-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543), _FASTEST_LARGE_RAD_S),
 )
 
 
@@ -72,7 +76,8 @@ class Kinematics:
     def joints(self, q: FloatArray) -> Joints:
         """The joints at ``q`` (6,)."""
         end = np.full(6, _RANGE_RAD)
-        return Joints(NAMES, q, -end, end, (False,) * 6, self.tool_jacobian)
+        fastest = np.array(self.model.fastest_rad_s)
+        return Joints(NAMES, q, -end, end, (False,) * 6, self.tool_jacobian, fastest)
 
     def _frames(self, q: FloatArray) -> list[FloatArray]:
         """The frames (4, 4) each joint turns in, and the tool's, in base."""

@@ -126,7 +126,7 @@ class Collector:
             self._limits,
             doubt,
             [still.view.T_base_tool for still in taken],
-            self._mover.reach(),
+            self._mover.routes(),
             seed=self._seed + round_number,
         )
 

@@ -11,6 +11,7 @@ from drivers.interfaces import Arm, ArmState, JointArm, Joints
 from rig.calibration import se3
 from rig.calibration_run.errors import PoseRefusedError, StopRequestedError
 from rig.calibration_run.reach import Reach
+from rig.calibration_run.routes import Routes
 from rig.config_safety import SafetyConfig
 from rig.deadman import Deadman
 from rig.envelope import Envelope, Surroundings
@@ -55,13 +56,14 @@ class Mover:
         self._joint_arm: JointArm | None = arm if isinstance(arm, JointArm) else None
         self._clock = clock
         self._safety = safety
-        self._envelope = Envelope(safety, T_tool_camera)
-        self._limiter = Limiter(safety, self._envelope)
+        self._T_tool_camera = T_tool_camera
+        self._limiter = Limiter(safety, Envelope(safety, T_tool_camera))
         self._deadman = deadman
         self._sender = Sender(arm, clock, self._limiter, hold_s, deadman)
         self._stop_requested = stop_requested
         self._speed = speed
         self._gain_per_s = min(_GAIN_PER_S, _DELAY_SHARE / max(safety.reaction_time_s, 1e-3))
+        self._rests: list[FloatArray] = []  # where it stood first, and where it stood last
         self.states: list[ArmState] = []
         self.on_tick: Callable[[float], None] = lambda now_s: None
 
@@ -71,17 +73,28 @@ class Mover:
         return self._newest().T_base_tool
 
     def reach(self) -> Reach:
-        """Tells to which poses the way from here is free."""
-        return Reach(self._envelope, self._newest(), self._joints())
+        """Tells to which poses the straight way from here is free."""
+        return Reach(self._safety, self._newest(), self._joints(), self._T_tool_camera)
+
+    def routes(self) -> Routes:
+        """Tells to which poses a way from here is free, straight or by way of where it was."""
+        return Routes(self.reach(), self._rests)
 
     def go_to(self, T_base_tool: FloatArray) -> None:
-        """Move in a straight line to a pose (4, 4) and come to rest there.
+        """Move to a pose (4, 4), straight or by way of where it was before, and rest there.
 
-        Raises PoseRefusedError when the envelope blocks the way or it takes far too long, and
-        StopRequestedError; the arm rests then as well.
+        Raises PoseRefusedError when no way is free, before anything moves, or it takes far too
+        long, and StopRequestedError; the arm rests then as well.
         """
-        way = self._way(T_base_tool)
-        patience_s = _PATIENCE * self._duration_s(way) + _LEAST_PATIENCE_S
+        self._read(self._clock.now_s())
+        if not self._rests:
+            self._rests.append(self.T_base_tool)
+        for way in self.routes().to(T_base_tool):
+            self._go_straight(way.T_base_tool, way.duration_s / self._speed)
+        self._rests = [self._rests[0], self.T_base_tool]
+
+    def _go_straight(self, T_base_tool: FloatArray, duration_s: float) -> None:
+        patience_s = _PATIENCE * duration_s + _LEAST_PATIENCE_S
         start_s = self._clock.now_s()
 
         def towards(elapsed_s: float, state: ArmState) -> FloatArray | None:
@@ -217,11 +230,6 @@ class Mover:
 
     def _way(self, T_base_tool: FloatArray) -> FloatArray:
         return se3.log(se3.inverse(self.T_base_tool) @ T_base_tool)
-
-    def _duration_s(self, way: FloatArray) -> float:
-        linear = float(np.linalg.norm(way[:3])) / self._safety.max_linear_speed_m_s
-        angular = float(np.linalg.norm(way[3:])) / self._safety.max_angular_speed_rad_s
-        return max(linear, angular) / self._speed
 
     def _approach(self, way: FloatArray) -> FloatArray:
         """A twist along ``way``: proportional to it, no faster than allowed, able to brake."""

@@ -18,9 +18,9 @@ from rig.calibration.pose_planning import PlannedPose, plan_poses, tour
 from rig.calibration.projection import to_vector
 from rig.calibration_run.collector import FIRST, REFINED, within_safety
 from rig.calibration_run.reach import Reach
+from rig.calibration_run.routes import Routes
 from rig.calibration_run.store import Store
 from rig.config import RigConfig
-from rig.envelope import Envelope
 from sim_backend.arm import joints_at
 from sim_backend.kinematics import joints_for
 from sim_backend.lens import lens_of
@@ -55,11 +55,9 @@ def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]
     scene = Scene(state, corner_points(config.calibration.board), size, T_base_tool)
     limits = within_safety(plan.limits, config.safety)
     simulated = is_simulated(config)
-    reach = Reach(
-        Envelope(config.safety, T_tool_camera),
-        ArmState(0.0, T_base_tool, np.zeros(6)),
-        joints_at(joints_for(T_base_tool)) if simulated else None,
-    )
+    state = ArmState(0.0, T_base_tool, np.zeros(6))
+    joints = joints_at(joints_for(T_base_tool)) if simulated else None
+    reach = Routes(Reach(config.safety, state, joints, T_tool_camera), [T_base_tool])
     first = plan_poses(scene, min(FIRST, plan.poses) - 1, limits, None, [T_base_tool], reach)
     taken = [T_base_tool, *(pose.T_base_tool for pose in first)]
     count = plan.poses - len(taken)

@@ -193,7 +193,7 @@ class Session:
         scene = Scene(geometry.state, corner_points(self._board), size, first.view.T_base_tool)
         # Some may be refused: a few more than are needed.
         poses = plan_poses(
-            scene, 2 * wanted + 2, self._limits, reachable=mover.reach(), seed=_VERIFY_SEED
+            scene, 2 * wanted + 2, self._limits, reachable=mover.routes(), seed=_VERIFY_SEED
         )
         stills = fresh_stills(mover, photographer, poses[::-1], wanted, progress.pose)
         self.verification = verify(stills, wiggles, geometry)

@@ -64,7 +64,10 @@ class World:
         return allowed.blocked
 
     def barrier(self, name: str, twist_tool: np.ndarray) -> Barrier:
-        return next(b for b in self.envelope.barriers(twist_tool, self.around()) if b.name == name)
+        found = (b for b in self.envelope.barriers(twist_tool, self.around()) if b.name == name)
+        barrier = next(found)
+        assert isinstance(barrier, Barrier)
+        return barrier
 
 
 HOME = np.array([0.1, -0.1, -0.2, 0.3, -0.2, 0.4])
@@ -187,3 +190,34 @@ def _outline(s: np.ndarray) -> np.ndarray:
     half = np.arcsin(1 / n)
     ring = np.cos(angles)[:, None] * across[0] + np.sin(angles)[:, None] * across[1]
     return np.asarray(np.cos(half) * s / n + np.sin(half) * ring)
+
+
+@settings(max_examples=40, deadline=None)
+@given(TWIST, st.floats(0.05, 2.0), st.floats(0.1, 1.0))
+def test_no_joint_is_asked_for_more_than_its_share_of_its_speed(
+    twist: np.ndarray, fastest: float, share: float
+) -> None:
+    q = np.array([0.0, 0.0, 0.0, 0.1, 1.3, 0.0])  # the wrist close to its singularity
+    joints = Joints(
+        ("x", "y", "z", "roll", "pitch", "spin"), q, -np.full(6, 9.0), np.full(6, 9.0),
+        (True, True, True, False, False, False), tool_jacobian, np.full(6, fastest),
+    )  # fmt: skip
+    config = SafetyConfig(min_singular_value=0.0, joint_speed_share=share)
+    around = Surroundings(ArmState(0.0, tool_pose(q), np.zeros(6)), joints=joints)
+    limiter = Limiter(config)
+    for _ in range(100):  # until it is up to speed
+        allowed = limiter.limit(twist, around, DT_S)
+    rates = np.abs(np.linalg.solve(tool_jacobian(q), allowed.twist_tool))
+    assert rates.max() <= share * fastest * 1.01
+    wanted = np.abs(np.linalg.solve(tool_jacobian(q), twist)).max()
+    slower = min(1.0, share * fastest / max(wanted, 1e-12))
+    within_speed = min(
+        1.0,
+        config.max_linear_speed_m_s / max(float(np.linalg.norm(twist[:3])), 1e-12),
+        config.max_angular_speed_rad_s / max(float(np.linalg.norm(twist[3:])), 1e-12),
+    )
+    assert allowed.twist_tool == pytest.approx(
+        min(slower, within_speed) * twist, rel=0.02, abs=1e-9
+    )
+    if slower < 0.9 * within_speed:
+        assert any(reason.endswith(" speed") and "joint" in reason for reason in allowed.reasons)

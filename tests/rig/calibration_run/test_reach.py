@@ -7,7 +7,6 @@ from drivers.interfaces import ArmState, Joints
 from rig.calibration import se3
 from rig.calibration_run.reach import Reach
 from rig.config_safety import SafetyConfig, TableConfig
-from rig.envelope import Envelope
 from sim_backend.arm import joints_at
 from sim_backend.kinematics import JOINT_HIGH, tool_jacobian, tool_pose
 
@@ -16,7 +15,7 @@ T_HOME = tool_pose(HOME)
 
 
 def reach(joints: Joints | None, safety: SafetyConfig | None = None) -> Reach:
-    return Reach(Envelope(safety or SafetyConfig()), ArmState(0.0, T_HOME, np.zeros(6)), joints)
+    return Reach(safety or SafetyConfig(), ArmState(0.0, T_HOME, np.zeros(6)), joints)
 
 
 @pytest.mark.parametrize("seed", range(5))
