@@ -19,7 +19,7 @@ def calibration_path(config: RigConfig) -> Path:
 def fingerprints(config: RigConfig) -> Fingerprints:
     """What a calibration depends on, as the configuration has it."""
     camera = config.camera.model_dump(mode="json", exclude={"method"})
-    arm = config.arm.model_dump(mode="json", exclude={"host", "port", "hold_s"})
+    arm = config.arm.model_dump(mode="json", exclude={"host", "port", "hold_s", "model"})
     tcp = arm.pop("tcp_offset", None)
     out = {
         "camera": fingerprint(camera),

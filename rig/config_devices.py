@@ -28,6 +28,9 @@ class OpenCvCamera(CameraSettings):
     method: Method = "limb"
 
 
+UrModel = Literal["UR3", "UR5", "UR10", "UR3e", "UR5e", "UR10e", "UR16e", "UR20", "UR30"]
+
+
 class SimArm(Section):
     """The simulated gantry; what it is like stands under ``sim.arm``."""
 
@@ -40,6 +43,8 @@ class UrArm(UrSettings):
 
     driver: Literal["ur"] = "ur"
     hold_s: Hold = 0.05
+    # Only for planning without the arm (`rig calibrate --dry-run`): connected, it is recognised.
+    model: UrModel | None = None
 
 
 class GrblArm(GrblSettings):

@@ -17,12 +17,11 @@ from rig.calibration.pose_candidates import Scene
 from rig.calibration.pose_planning import PlannedPose, plan_poses, tour
 from rig.calibration.projection import to_vector
 from rig.calibration_run.collector import FIRST, REFINED, within_safety
+from rig.calibration_run.joints_ahead import joints_ahead
 from rig.calibration_run.reach import Reach
 from rig.calibration_run.routes import Routes
 from rig.calibration_run.store import Store
 from rig.config import RigConfig
-from sim_backend.arm import joints_at
-from sim_backend.kinematics import joints_for
 from sim_backend.lens import lens_of
 from sim_backend.scene import build_scene
 from sim_backend.start import start_pose
@@ -41,6 +40,7 @@ class Foresight:
     later: tuple[PlannedPose, ...]  # planned anew on the way, when more is known
     assumed: str  # where the first look is taken from, in words
     joints_checked: bool
+    joints_of: str  # the arm whose joints were checked, or why none were
 
 
 def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]) -> Foresight:
@@ -54,10 +54,9 @@ def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]
     state = State(T_tool_camera, board, to_vector(intrinsics))
     scene = Scene(state, corner_points(config.calibration.board), size, T_base_tool)
     limits = within_safety(plan.limits, config.safety)
-    simulated = is_simulated(config)
-    state = ArmState(0.0, T_base_tool, np.zeros(6))
-    joints = joints_at(joints_for(T_base_tool)) if simulated else None
-    reach = Routes(Reach(config.safety, state, joints, T_tool_camera), [T_base_tool])
+    joints, whose = joints_ahead(config, T_base_tool)
+    here = ArmState(0.0, T_base_tool, np.zeros(6))
+    reach = Routes(Reach(config.safety, here, joints, T_tool_camera), [T_base_tool])
     first = plan_poses(scene, min(FIRST, plan.poses) - 1, limits, None, [T_base_tool], reach)
     taken = [T_base_tool, *(pose.T_base_tool for pose in first)]
     count = plan.poses - len(taken)
@@ -68,7 +67,8 @@ def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]
         tuple(there),
         tuple(tour(later, there[-1].T_base_tool)),
         assumed,
-        simulated,
+        joints is not None,
+        whose,
     )
 
 

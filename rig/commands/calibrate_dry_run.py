@@ -41,9 +41,10 @@ def dry_run(step: Step, request: Request) -> None:
         f"{np.linalg.norm(tools, axis=1).max():.2f} m from the base's origin"
     )
     warn(
-        "every pose is within the joints' ranges on a straight way from the first look"
+        "every pose, on the way from the first look, is within the joints' ranges and off the "
+        f"singularities of {foresight.joints_of}"
         if foresight.joints_checked
-        else "joints are checked when the arm is connected: a pose out of reach is passed over then"
+        else foresight.joints_of
     )
     warn(f"written: {picture}")
     if request.as_json:

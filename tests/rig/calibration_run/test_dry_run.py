@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drivers.ur.kinematics import MODELS, Kinematics
 from rig import build
+from rig.calibration_run.joints_ahead import ur_joints
+from rig.config_devices import UrModel
 from tests.rig.calibration_run.small_rig import calibrate, failing
-from tests.rig.command_line import rig
+from tests.rig.command_line import Outcome, rig
 
 BOX = ("safety.workspace_min_m=[-0.2,-0.2,0.4]", "safety.workspace_max_m=[0.2,0.2,0.9]")
 
@@ -48,6 +51,58 @@ def test_a_real_rig_is_planned_without_its_devices(here: Path) -> None:
     assert "as the simulated rig has it: the board at [0.45, -0.13, 0.03] m" in done.stderr
     assert "joints are checked when the arm is connected" in done.stderr
     assert (here / "calibration" / "lab-plan.png").exists()
+
+
+LAB = """
+name: lab
+camera: {driver: opencv, source: /dev/video7, width: 640, height: 480}
+arm: {driver: ur, host: 192.168.0.100}
+calibration:
+  intrinsics: {fx_px: 800, fy_px: 800, cx_px: 319.5, cy_px: 239.5}
+  tool_camera_xyz_m: [0.03, -0.02, 0.06]
+  tool_camera_rotvec_rad: [0, 0, 0]
+  plan: {poses: 10}
+safety: {workspace_min_m: [-2.0, -2.0, 0.05]}
+"""
+
+
+def lab(here: Path, *settings: str) -> Outcome:
+    (here / "lab.yaml").write_text(LAB, encoding="utf-8")
+    sets = (f"--set={one}" for one in settings)
+    return rig("calibrate", "--dry-run", "--json", "--rig", "lab.yaml", *sets)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        "UR5e",
+        pytest.param("UR3e", marks=pytest.mark.slow),
+        pytest.param("UR10e", marks=pytest.mark.slow),
+    ],
+)
+def test_a_ur_s_plan_keeps_within_its_reach_and_off_its_singularities(
+    here: Path, model: UrModel
+) -> None:
+    done = lab(here, f"arm.model={model}", "sim.board.position_m=[0.3,-0.1,0.03]")
+    assert done.exit_code == 0, done.stderr
+    assert f"singularities of a {model}" in done.stderr
+    kinematics = Kinematics(next(one for one in MODELS if one.name == model), (0.0,) * 6)
+    poses = [np.array(pose["T_base_tool"]) for pose in json.loads(done.stdout)["poses"]]
+    for T in poses:
+        joints = ur_joints(kinematics, T)
+        assert joints is not None
+        assert kinematics.tool_pose(joints.q) == pytest.approx(T, abs=1e-6)
+
+
+def test_a_first_look_out_of_a_ur_s_reach_is_said(here: Path) -> None:
+    done = lab(here, "arm.model=UR3e", "sim.board.position_m=[0.9,-0.13,0.03]")
+    assert "a UR3e does not get to this first look" in done.stderr
+
+
+def test_an_unknown_model_lists_the_known_ones(here: Path) -> None:
+    done = lab(here, "arm.model=UR7")
+    assert done.exit_code == 2
+    assert "UR5e" in done.stderr and "UR10e" in done.stderr
 
 
 def test_a_plan_without_room_says_what_to_widen() -> None:
