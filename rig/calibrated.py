@@ -102,6 +102,7 @@ def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
             "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
             "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
             "latency_s": latency.latency_s,
+            "row_time_s": latency.row_time_s,
         },
     )
 

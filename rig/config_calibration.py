@@ -28,6 +28,7 @@ class PlanConfig(Section):
     verify_poses: Annotated[int, Field(ge=2, le=50)] = 4
     segments: Annotated[int, Field(ge=2, le=10)] = 2  # of wiggling, for the latency
     segment_s: Annotated[float, Field(ge=3, le=60)] = 5.0
+    rolling_shutter: bool = False  # find the time from row to row too, from the same wiggles
     speed: Annotated[float, Field(gt=0, le=1)] = 0.7  # share of the safety section's speeds
     limits: PoseLimits = PoseLimits()
     hand_eye: HandEyeSettings = HandEyeSettings()
@@ -45,12 +46,15 @@ class CalibrationConfig(Section):
     tool_camera_xyz_m: tuple[Finite, Finite, Finite] | None = None
     tool_camera_rotvec_rad: tuple[Finite, Finite, Finite] | None = None
     latency_s: Finite = 0.0  # by which the images' stamps are late
+    row_time_s: Finite = 0.0  # by which each row of an image is exposed after the one above it
     board: BoardConfig = BoardConfig()
     plan: PlanConfig = PlanConfig()
     required: Requirements = Requirements()
 
     @model_validator(mode="after")
-    def _hand_eye_whole(self) -> Self:
+    def _what_goes_together(self) -> Self:
         if (self.tool_camera_xyz_m is None) != (self.tool_camera_rotvec_rad is None):
             raise ValueError("tool_camera_xyz_m and tool_camera_rotvec_rad go together: give both")
+        if self.row_time_s != 0.0 and self.intrinsics is None and self.file is None:
+            raise ValueError("row_time_s goes with intrinsics: give both")
         return self

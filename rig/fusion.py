@@ -12,6 +12,7 @@ from drivers.errors import SafetyError
 from drivers.interfaces import ArmState, Frame
 from estimator.estimate import Correction, Estimate, Estimator
 from estimator.twist_history import MotionUnknownError, TwistHistory
+from rig.rolling_shutter import RollingShutter
 from rig.run_data import RunData, Snapshot
 from rig.vision import Sighting
 
@@ -43,7 +44,8 @@ class FusionLog(Protocol):
 class Fusion:
     """Keeps the estimator's state at the last image's exposure and predicts from there to now.
 
-    Images were exposed ``stamps_late_s`` before their stamps, as the calibration found.
+    Images were exposed ``stamps_late_s`` before their stamps, as the calibration found; with a
+    rolling ``shutter``, stamps hold for the middle row.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Fusion:
         log: FusionLog,
         max_extrapolation_s: float,
         stamps_late_s: float = 0.0,
+        shutter: RollingShutter | None = None,
     ) -> None:
         self._estimator = estimator
         self._camera_from_tool = data.camera_from_tool
@@ -60,6 +63,7 @@ class Fusion:
         self._data = data
         self._log = log
         self._stamps_late_s = stamps_late_s
+        self._shutter = shutter
         # Sightings wait here until the arm has reported the motion up to their exposure.
         self._waiting: deque[Sighting] = deque()
         self._periods_s: deque[float] = deque(maxlen=_PERIODS)
@@ -132,8 +136,10 @@ class Fusion:
         return float(np.median(self._periods_s)) if self._periods_s else None
 
     def _corrected(self, sighting: Sighting) -> Sighting:
-        frame = sighting.frame
+        frame, feature = sighting.frame, sighting.measurement.feature
         t_s = frame.t_exposure_mid_s - self._stamps_late_s
+        if self._shutter is not None and feature is not None:
+            t_s += self._shutter.after_middle_s(feature.s, frame.image.shape[0])
         return replace(sighting, frame=replace(frame, t_exposure_mid_s=t_s))
 
     def _note_period(self, frame: Frame) -> None:

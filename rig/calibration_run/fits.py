@@ -76,14 +76,18 @@ def fit_geometry(
     return Geometry(lens, hand_eye)
 
 
-def fit_delay(recording: Recording, geometry: Geometry) -> LatencyFit:
-    """How late the stamps are; raises CalibrationError when segments disagree or are weak."""
+def fit_delay(recording: Recording, geometry: Geometry, rolling: bool = False) -> LatencyFit:
+    """How late the stamps are and, if ``rolling``, the time from row to row.
+
+    Raises CalibrationError when segments disagree or are weak.
+    """
     return fit_latency(
         recording.segments,
         recording.trajectory(),
         geometry.state,
         geometry.hand_eye.covariance,
         recording.height,
+        rolling,
     )
 
 

@@ -174,7 +174,7 @@ class Session:
         self._progress.step("fit", "latency")
         try:
             with self._stop.at_once():
-                self.latency = fit_delay(recording, geometry)
+                self.latency = fit_delay(recording, geometry, self._plan.rolling_shutter)
         except CalibrationError:
             self._store.drop_recording()  # the same again would fail again
             raise

@@ -19,6 +19,7 @@ def json_of(
     verdict = found.verdict
     delay_s, delay_std_s = delay
     known = latency is not None and bool(np.isfinite(delay_s))
+    rolling = latency is not None and latency.row_time_std_s > 0.0
     return {
         "rig": found.rig,
         "intrinsics": None
@@ -49,6 +50,8 @@ def json_of(
         if latency is not None and known
         else None,
         "stamp_late_s": None if latency is None else latency.latency_s,
+        "row_time_s": latency.row_time_s if rolling and latency is not None else None,
+        "row_time_std_s": latency.row_time_std_s if rolling and latency is not None else None,
         "held_out_px": None if hand_eye is None else hand_eye.held_out_px,
         "held_out_mm": None if hand_eye is None else hand_eye.held_out_mm,
         "held_out_deg": None if hand_eye is None else hand_eye.held_out_deg,
@@ -83,9 +86,13 @@ def table(summary: dict[str, Json]) -> Table:
         ("latency_s", "latency, exposure to program", 1e3, "ms"),
         ("stamp_late_s", "  stamps are late by", 1e3, "ms"),
         ("latency_std_s", "  ±", 1e3, "ms"),
+        ("row_time_s", "row to row", 1e6, "µs"),
+        ("row_time_std_s", "  ±", 1e6, "µs"),
         ("wall_s", "took", 1.0, "s"),
     ):
         value = summary[key]
+        if value is None and key.startswith("row_time"):
+            continue  # not asked for
         out.add_row(name, f"{factor * value:.3f} {unit}" if isinstance(value, float) else "–")
     out.add_row("file", str(summary["file"]))
     return out

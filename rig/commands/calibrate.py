@@ -17,6 +17,7 @@ from rig.commands.calibrate_request import (
     Realtime,
     Request,
     Resume,
+    RollingShutter,
     Step,
     earlier,
     with_pictures,
@@ -56,9 +57,10 @@ def calibrate(
     from_images: FromImages = None,
     manual: Manual = False,
     dry_run: DryRun = False,
+    rolling_shutter: RollingShutter = False,
 ) -> None:
     """Calibrate everything, in order: intrinsics, hand-eye, latency, verification."""
-    modes = from_images, manual, dry_run
+    modes = from_images, manual, dry_run, rolling_shutter
     context.obj = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json, *modes)
     if context.invoked_subcommand is None:
         _run("all", context.obj)
@@ -78,8 +80,9 @@ def _command(step: Step) -> Callable[..., None]:
         from_images: FromImages = None,
         manual: Manual = False,
         dry_run: DryRun = False,
+        rolling_shutter: RollingShutter = False,
     ) -> None:
-        modes = from_images, manual, dry_run
+        modes = from_images, manual, dry_run, rolling_shutter
         own = Request(rig, tuple(assignments or ()), seed, resume, realtime, as_json, *modes)
         _run(step, context.obj.with_more(own))
 

@@ -19,6 +19,13 @@ Realtime = Annotated[
 Resume = Annotated[
     bool, typer.Option("--resume", help="Go on with what an interrupted calibration collected.")
 ]
+RollingShutter = Annotated[
+    bool,
+    typer.Option(
+        "--rolling-shutter",
+        help="Find the time from one image row to the next too (calibration.plan.rolling_shutter).",
+    ),
+]
 FromImages = Annotated[
     Path | None,
     typer.Option(
@@ -58,6 +65,7 @@ class Request:
     from_images: Path | None
     manual: bool
     dry_run: bool
+    rolling_shutter: bool = False
 
     def with_more(self, more: "Request") -> "Request":
         """Options may stand before the step and after it; what stands after goes before."""
@@ -71,6 +79,7 @@ class Request:
             more.from_images or self.from_images,
             self.manual or more.manual,
             more.dry_run or self.dry_run,
+            more.rolling_shutter or self.rolling_shutter,
         )
 
     def check(self, step: Step) -> None:
@@ -100,6 +109,7 @@ class Request:
         from rig.config_load import load_config
 
         extra = [*self.assignments, *([] if self.seed is None else [f"sim.seed={self.seed}"])]
+        extra += ["calibration.plan.rolling_shutter=true"] if self.rolling_shutter else []
         return load_config("sphere", self.rig, extra)
 
 

@@ -17,6 +17,7 @@ Source = Literal["features", "images"]
 _ALWAYS = (
     "estimator",
     "calibration.latency_s",
+    "calibration.row_time_s",
     "calibration.tool_camera_xyz_m",
     "calibration.tool_camera_rotvec_rad",
     "run.converged_fraction",

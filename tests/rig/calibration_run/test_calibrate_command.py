@@ -107,6 +107,31 @@ def test_an_interrupted_calibration_goes_on_with_what_it_has(folder: Path) -> No
     assert json.loads(done.stdout)["stamp_late_s"] == pytest.approx(0.075, abs=2e-4)
 
 
+def test_a_row_s_time_is_found_where_asked_and_zero_for_a_global_shutter(folder: Path) -> None:
+    saved = (folder / "calibration" / "sim.yaml").read_bytes()
+    done = calibrate("latency", "--rolling-shutter", settings=TRUTH)
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert 0.0 < found["row_time_std_s"] < 1e-6
+    assert abs(found["row_time_s"]) < 4.0 * found["row_time_std_s"]
+    assert "row to row" in done.stderr
+    (folder / "calibration" / "sim.yaml").write_bytes(saved)
+
+
+@pytest.mark.slow
+def test_a_rolling_shutter_s_row_time_is_found_and_used(here: Path) -> None:
+    rolling = ["sim.camera.row_time_s=5e-5"]
+    done = calibrate("--rolling-shutter", settings=rolling)
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert abs(found["row_time_s"] - 5e-5) < 4.0 * found["row_time_std_s"] < 2e-6
+    run = rig("run", "--target", "sphere", "--json", *[f"--set={s}" for s in [*rolling, SMALL[-1]]])
+    summary = json.loads(run.stdout)
+    assert abs(summary["relative_error"]) < 1e-3
+    used = yaml.safe_load((Path(summary["run_dir"]) / "config.yaml").read_text(encoding="utf-8"))
+    assert used["calibration"]["row_time_s"] == pytest.approx(found["row_time_s"])
+
+
 def test_what_a_calibration_saw_and_did_is_recorded(folder: Path) -> None:
     data = folder / "calibration" / "sim-data"
     log = open_log(data / "log-all.mcap")
