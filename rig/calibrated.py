@@ -4,29 +4,17 @@ from pathlib import Path
 
 from drivers.errors import ConfigError
 from rig.build import is_simulated
-from rig.calibration.result import CalibrationFile, Fingerprints, fingerprint, load_calibration
+from rig.calibration.result import CalibrationFile, load_calibration
 from rig.calibration.result_check import check_usable
 from rig.config import RigConfig
 from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
+from rig.fingerprints import fingerprints
 from sim_backend import drawings
 
 
 def calibration_path(config: RigConfig) -> Path:
     """Where the rig's calibration is, or will be."""
     return Path(config.calibration.file or f"calibration/{config.name}.yaml")
-
-
-def fingerprints(config: RigConfig) -> Fingerprints:
-    """What a calibration depends on, as the configuration has it."""
-    camera = config.camera.model_dump(mode="json", exclude={"method"})
-    arm = config.arm.model_dump(mode="json", exclude={"host", "port", "hold_s", "model"})
-    tcp = arm.pop("tcp_offset", None)
-    out = {
-        "camera": fingerprint(camera),
-        "arm": fingerprint(arm),
-        "board": fingerprint(config.calibration.board.model_dump(mode="json")),
-    }
-    return out if tcp is None else {**out, "tcp": fingerprint(tcp)}
 
 
 def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig, str]:

@@ -148,7 +148,7 @@ def _run(step: Step, request: Request) -> None:
 def _on_the_rig(step: Step, request: Request) -> None:
     from drivers.clock import WallClock
     from rig.build import is_simulated
-    from rig.calibrated import calibration_path, fingerprints, with_nominal
+    from rig.calibrated import calibration_path, with_nominal
     from rig.calibration_run.bench import open_bench
     from rig.calibration_run.hand_view import HandView
     from rig.calibration_run.keys import Keys
@@ -157,6 +157,7 @@ def _on_the_rig(step: Step, request: Request) -> None:
     from rig.calibration_run.session import Session
     from rig.calibration_run.store import Store
     from rig.calibration_run.summary import json_of, table
+    from rig.fingerprints import fingerprints
     from rig.stop_request import StopRequest
 
     config = request.config()

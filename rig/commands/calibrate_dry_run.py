@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 def dry_run(step: Step, request: Request) -> None:
     """Plan and draw; opens nothing."""
-    from rig.calibrated import calibration_path, fingerprints, with_nominal
+    from rig.calibrated import calibration_path, with_nominal
     from rig.calibration_run.plan_ahead import plan_ahead
     from rig.calibration_run.plan_picture import draw_plan
+    from rig.fingerprints import fingerprints
 
     config = request.config()
     path, now = calibration_path(config), fingerprints(config)

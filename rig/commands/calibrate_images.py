@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def calibrate_from_images(folder: Path, request: Request) -> None:
     """Fit, save as the calibration's intrinsics, and say what is still missing."""
     from drivers.clock import WallClock, local_timestamp
-    from rig.calibrated import calibration_path, fingerprints
+    from rig.calibrated import calibration_path
     from rig.calibration.detection import BoardDetector
     from rig.calibration.result import CalibrationFile, load_calibration, save_calibration
     from rig.calibration.result_check import judge
@@ -26,6 +26,7 @@ def calibrate_from_images(folder: Path, request: Request) -> None:
     from rig.calibration_run.from_images import fit_folder
     from rig.calibration_run.progress import ConsoleProgress
     from rig.calibration_run.summary import json_of, table
+    from rig.fingerprints import fingerprints
     from rig.stop_request import StopRequest
 
     config, wall = request.config(), WallClock()

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from drivers.errors import ConfigError
-from rig.calibrated import calibrated, calibration_path, fingerprints, with_nominal
+from rig.calibrated import calibrated, calibration_path, with_nominal
 from rig.calibration.board import BoardConfig
 from rig.calibration.result import (
     CalibrationFile,
@@ -20,6 +20,7 @@ from rig.calibration.result import (
 )
 from rig.config import RigConfig
 from rig.config_load import load_config
+from rig.fingerprints import fingerprints
 from sim_backend import drawings
 from sim_backend.config import SimConfig
 
@@ -121,9 +122,8 @@ def test_a_failed_calibration_is_refused_with_its_reasons() -> None:
 def test_a_calibration_of_another_setup_is_refused_with_the_step_to_repeat() -> None:
     rig = config()
     save_calibration(calibration_of(rig), calibration_path(rig))
-    changed = rig.model_copy(update={"camera": rig.camera.model_copy(update={"driver": "other"})})
     with pytest.raises(ConfigError, match="rig calibrate intrinsics"):
-        calibrated(changed)
+        calibrated(config("sim.camera.width=1280", "sim.camera.height=960"))
 
 
 def test_another_board_in_the_configuration_does_not_matter_to_a_run() -> None:
