@@ -17,6 +17,7 @@ from estimator.image.intrinsics import Intrinsics
 from estimator.image.tracker import TargetTracker, warm_up
 from rig.config import RigConfig, TargetKind
 from rig.config_devices import ArmConfig, CameraConfig
+from rig.image_size import SizedVision
 from rig.vision import Vision
 from rig.vision.inline import InlineVision
 from rig.vision.messages import Job
@@ -163,6 +164,7 @@ def _simulated(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
     else:
         here = ThreadedVision if realtime else InlineVision
         vision = here(devices.camera, _tracker(config, target, intrinsics))
+    vision = _sized(vision, config) if devices.features is None else vision
     devices.everything_ready()
     return Rig(
         arm=devices.arm,
@@ -194,8 +196,15 @@ def _real_vision(
 ) -> Vision:
     if config.run.vision == "thread":
         tracker = _tracker(config, target, intrinsics)
-        return ThreadedVision(open_camera(config.camera, clock), tracker)
-    return ProcessVision(Job(config, target, intrinsics), clock)
+        return _sized(ThreadedVision(open_camera(config.camera, clock), tracker), config)
+    return _sized(ProcessVision(Job(config, target, intrinsics), clock), config)
+
+
+def _sized(vision: Vision, config: RigConfig) -> Vision:
+    """Vision that accepts only images that the intrinsics hold for, where that is known."""
+    given = config.calibration.intrinsics
+    size_px = None if given is None else given.image_size_px
+    return vision if size_px is None else SizedVision(vision, size_px)
 
 
 def _tracker(config: RigConfig, target: TargetKind, intrinsics: Intrinsics) -> TargetTracker:

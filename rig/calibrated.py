@@ -4,7 +4,7 @@ from pathlib import Path
 
 from drivers.errors import ConfigError
 from rig.build import is_simulated
-from rig.calibration.result import CalibrationFile, load_calibration
+from rig.calibration.result import CalibrationFile, IntrinsicsResult, load_calibration
 from rig.calibration.result_check import check_usable
 from rig.config import RigConfig
 from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
@@ -80,18 +80,24 @@ def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
     return _replaced(
         config,
         {
-            "intrinsics": IntrinsicsConfig(
-                fx_px=lens.fx_px,
-                fy_px=lens.fy_px,
-                cx_px=lens.cx_px,
-                cy_px=lens.cy_px,
-                distortion=lens.distortion,
-            ),
+            "intrinsics": intrinsics_config(lens),
             "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
             "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
             "latency_s": latency.latency_s,
             "row_time_s": latency.row_time_s,
         },
+    )
+
+
+def intrinsics_config(found: IntrinsicsResult) -> IntrinsicsConfig:
+    """A calibration's intrinsics as a configuration has them."""
+    return IntrinsicsConfig(
+        fx_px=found.fx_px,
+        fy_px=found.fy_px,
+        cx_px=found.cx_px,
+        cy_px=found.cy_px,
+        distortion=found.distortion,
+        image_size_px=(found.width, found.height),
     )
 
 

@@ -19,6 +19,8 @@ class IntrinsicsConfig(Section):
     cx_px: Finite
     cy_px: Finite
     distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    # Width and height of the images they hold for; of another size, none is accepted.
+    image_size_px: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = None
 
 
 class PlanConfig(Section):

@@ -21,6 +21,7 @@ from rig.build import (
 )
 from rig.config import RigConfig
 from rig.deadman import Deadman
+from rig.image_size import SizedCamera
 
 FloatArray = NDArray[np.float64]
 
@@ -64,10 +65,11 @@ def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Benc
         intrinsics, T_tool_camera = given_geometry(config, devices)
         devices.everything_ready()
         deadman = _deadman(config, devices.clock, devices.arm) if realtime else None
-        return Bench(devices.camera, devices.arm, devices.clock, intrinsics, T_tool_camera, deadman)
+        camera = _sized(devices.camera, config)
+        return Bench(camera, devices.arm, devices.clock, intrinsics, T_tool_camera, deadman)
     intrinsics, T_tool_camera = given_geometry(config, None)
     clock = WallClock()
-    camera = open_camera(config.camera, clock)
+    camera = _sized(open_camera(config.camera, clock), config)
     try:
         listener = open_listener(config.arm, clock) if by_hand else None
         arm = open_arm(config.arm, clock) if listener is None else listener
@@ -76,6 +78,13 @@ def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Benc
         raise
     deadman = _deadman(config, clock, arm) if listener is None else None
     return Bench(camera, arm, clock, intrinsics, T_tool_camera, deadman, listener is None)
+
+
+def _sized(camera: Camera, config: RigConfig) -> Camera:
+    """A camera that delivers only what the intrinsics to start from hold for, where known."""
+    given = config.calibration.intrinsics
+    size_px = None if given is None else given.image_size_px
+    return camera if size_px is None else SizedCamera(camera, size_px)
 
 
 def _deadman(config: RigConfig, clock: Clock, arm: Arm) -> Deadman:

@@ -139,17 +139,10 @@ def earlier(step: Step, path: Path, now: "Fingerprints") -> "CalibrationFile | N
 
 def with_pictures(config: "RigConfig", before: "CalibrationFile | None") -> "RigConfig":
     """``config`` that starts from intrinsics found from pictures, where there are none given."""
-    from rig.config_calibration import IntrinsicsConfig
+    from rig.calibrated import intrinsics_config
 
     lens = None if before is None else before.intrinsics
     if lens is None or not lens.from_images or config.calibration.intrinsics is not None:
         return config
-    given = IntrinsicsConfig(
-        fx_px=lens.fx_px,
-        fy_px=lens.fy_px,
-        cx_px=lens.cx_px,
-        cy_px=lens.cy_px,
-        distortion=lens.distortion,
-    )
-    section = config.calibration.model_copy(update={"intrinsics": given})
+    section = config.calibration.model_copy(update={"intrinsics": intrinsics_config(lens)})
     return config.model_copy(update={"calibration": section})
