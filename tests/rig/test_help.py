@@ -16,7 +16,7 @@ COMMANDS = [
     *("log info", "log export", "log repair", "sim serve", "sim fault"),
 ]
 # These choose another task, or may be given often: without them nothing is missing.
-NO_VALUE_MISSING = {"--set", "--from-images"}
+NO_VALUE_MISSING = {"--set", "--from-images", "--scheduler"}
 UNITS = ("second", " ms", " s.", " m.")
 
 
