@@ -184,12 +184,12 @@ def rows(status: LiveStatus, rates: Rates) -> list[tuple[str, str]]:
     else:
         radius = f"{estimate.radius_m * 1e3:.3f} mm"
         residual = f"{estimate.residual:.1e}"
-    left = f"{100 * status.remaining_fraction:.1f} %"
+    share = 100.0 * status.remaining_fraction
     stated = estimate is not None and estimate.variance is not None
     return [
         ("R", radius),
         ("residual", residual),
-        ("95 % interval", f"± {left}") if stated else ("transient left", left),
+        ("95 % interval", f"± {share:.2g} %") if stated else ("transient left", f"{share:.1f} %"),
         ("camera", f"{rates.camera_fps:.1f} fps ({status.frames_lost} lost)"),
         ("loop", f"{rates.loop_hz:.1f} Hz ({status.overruns} overruns)"),
         ("speed", f"{status.speed_m_s * 1e3:.1f} mm/s"),

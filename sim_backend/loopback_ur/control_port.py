@@ -3,6 +3,7 @@ and ask for the truth.
 """
 
 import json
+import math
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class ControlPort:
     def _motion(self, since_s: float) -> list[list[float]]:
         """Rows (t_s, q (6), qd (6)) since an instant, at most the last ten seconds."""
         history = self._truth.history
-        first = int(max(0.0, (since_s - history.start_s) / history.step_s))
+        first = math.ceil((since_s - history.start_s) / history.step_s - 1e-6)
         numbers = np.arange(max(first, history.first, history.count - _MOST_ROWS), history.count)
         q, qd = history.entries(numbers)
         times = history.start_s + numbers * history.step_s

@@ -1,5 +1,6 @@
 """A camera on the emulated arm sees the true motion, in the controller's process or another."""
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,7 +12,9 @@ from sim_backend.clock import SimulatedClock
 from sim_backend.history import JointHistory
 from sim_backend.loopback_rig.remote import RemoteMotion
 from sim_backend.loopback_ur.config import ControllerConfig
+from sim_backend.loopback_ur.control_port import ControlPort
 from sim_backend.loopback_ur.controller import Controller
+from sim_backend.loopback_ur.faults import Faults
 from sim_backend.loopback_ur.kinematics import HOME_Q, tool_pose, transform
 from sim_backend.loopback_ur.motion import STEP_S
 from sim_backend.loopback_ur.process import LoopbackControl, LoopbackProcess
@@ -69,3 +72,19 @@ def test_another_process_sees_the_same_and_stays_up_to_date(loopback):
     expected = tool_pose(HOME_Q + 0.1, np.eye(4)) @ T_TOOL_CAMERA
     assert np.allclose(motion.T_base_camera(newest_s), expected)
     control.close()
+
+
+def test_who_asks_between_two_samples_does_not_get_the_former_again():
+    truth = recorded(0.1)
+    controller = Controller(ControllerConfig())
+    port = ControlPort(controller, Faults(controller), truth)
+
+    def since(t_s):
+        rows = json.loads(port.answer(json.dumps({"get": "motion", "since_s": t_s})))["motion"]
+        return [row[0] for row in rows]
+
+    samples = [5.0 + k * STEP_S for k in range(51)]
+    assert since(0.0) == pytest.approx(samples)
+    assert since(5.0 + 10 * STEP_S) == pytest.approx(samples[10:])
+    assert since(5.0 + 10.5 * STEP_S) == pytest.approx(samples[11:])
+    assert since(5.0 + 50.5 * STEP_S) == []
