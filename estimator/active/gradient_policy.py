@@ -33,11 +33,12 @@ class GradientPolicy:
     For points, a limb plane and whatever else has p unknowns; ``PaperPolicy`` is the law as
     printed for a sphere or a cylinder, compiled. J_v and J_s are those of the smooth σ1² of
     ``least_sigma2``; ṡ is what the model makes of the newest estimate. A ṡ that raises σ1² by
-    itself is not undone, unlike in print: on its way towards a point, the target being
-    centred, the camera would never leave the ray. Where σ1 vanishes (v towards a point, say)
-    J_v vanishes too, and v is pushed to where the unknown that is lost shows most. The maximum
-    is that of the neighbourhood. A k2 too large for the steps of ``advance`` counts as the
-    largest they can follow. Before an estimate with a state v stays as it is.
+    itself is not undone, unlike in print: that can keep a camera which goes towards a point,
+    while it turns to centre the target, on its way for as long as it goes. Where σ1 vanishes (v
+    towards a point, say) J_v vanishes too, and v is pushed to where the unknown that is lost
+    shows most. The maximum is that of the neighbourhood. Gains too large for the steps of
+    ``advance`` count as the largest they can follow. Before an estimate with a state v stays as
+    it is.
     Raises ValueError for v0 = 0 or a negative gain.
     """
 
@@ -73,10 +74,11 @@ class GradientPolicy:
         curving = _KINK * _gain(spectrum(B @ self._v), B) ** 2
         fastest = max(self._k1, self._k2 * curving, math.hypot(*omega))
         steps = min(max(1, math.ceil(dt_s * fastest / _MAX_GAIN_STEP)), _MOST_STEPS)
-        k2 = min(self._k2, _MAX_GAIN_STEP * steps / (max(dt_s, 1e-9) * max(curving, 1e-9)))
+        most = _MAX_GAIN_STEP * steps / max(dt_s, 1e-9)
+        gains = min(self._k1, most), min(self._k2, most / max(curving, 1e-9))
         for _ in range(steps):
-            half = self._v + 0.5 * dt_s / steps * self._rate(self._v, B, B_dot, k2)
-            self._v = self._v + dt_s / steps * self._rate(half, B, B_dot, k2)
+            half = self._v + 0.5 * dt_s / steps * self._rate(self._v, B, B_dot, gains)
+            self._v = self._v + dt_s / steps * self._rate(half, B, B_dot, gains)
 
     def v_dot(self, v: FloatArray, omega: FloatArray) -> FloatArray:
         """v̇ (3,) at v (3,), in m/s²; ValueError before an estimate with a state."""
@@ -84,16 +86,18 @@ class GradientPolicy:
             raise ValueError("GradientPolicy knows no state of its model yet")
         B = structure_by_v(self._model, self._s)
         B_dot = structure_along(self._model, self._s, self._s_dot(v, omega))
-        return self._rate(v, B, B_dot, self._k2)
+        return self._rate(v, B, B_dot, (self._k1, self._k2))
 
     def _s_dot(self, v: FloatArray, omega: FloatArray) -> FloatArray:
         assert self._s is not None
         u = np.concatenate((v, omega))
         return self._model.f_m(self._s, u) + self._model.Omega(self._s, v).T @ self._chi
 
-    def _rate(self, v: FloatArray, B: FloatArray, B_dot: FloatArray, k2: float) -> FloatArray:
-        square = float(v @ v)
-        along = self._k1 * (self._kappa_des - 0.5 * square) / square * v
+    def _rate(
+        self, v: FloatArray, B: FloatArray, B_dot: FloatArray, gains: tuple[float, float]
+    ) -> FloatArray:
+        (k1, k2), square = gains, float(v @ v)
+        along = k1 * (self._kappa_des - 0.5 * square) / square * v
         if k2 == 0.0:
             return along
         found = spectrum(B @ v)

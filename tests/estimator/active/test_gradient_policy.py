@@ -80,7 +80,8 @@ def test_the_least_sigma2_climbs_to_where_no_direction_near_is_better(
 def test_a_gain_too_large_for_the_tick_is_followed_as_far_as_it_can_be() -> None:
     model = Points(3)
     s, chi = truth(model, THREE)
-    policy = informed(model, s, chi, SPEED * np.array([0.0, 0.0, 1.0]), k2=1e6)
+    policy = GradientPolicy(model, SPEED * np.array([0.0, 0.0, 1.0]), 1e5, 1e6)
+    policy.inform(Estimate(0.0, s[:3], None, 1.0, None, 0.0, state=s, unknowns=chi))
     for _ in range(30):
         policy.advance(None, np.array([0.3, 0.0, 0.0]), 0.02)
         assert np.linalg.norm(policy.v) == pytest.approx(SPEED, rel=0.05)
