@@ -4,9 +4,11 @@ import contextlib
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from drivers.errors import ConfigError, DeviceTimeoutError, OperateError
+from drivers.errors import ConfigError, ConnectError, DeviceTimeoutError, OperateError
 from drivers.grbl.arm import GrblArm
+from drivers.grbl.link import SerialLink
 from drivers.grbl.settings import GrblSettings
+from drivers.grbl.stopping import stop_motion
 from drivers.grbl.timing import GrblTiming
 from drivers.interfaces import Arm, ArmState
 from rig.arm_kits import Address, Json, own_settings
@@ -55,13 +57,18 @@ class GrblKit:
             arm.close()
 
     def stop(self, clock: Clock) -> str:
-        """Cancel any jog."""
-        arm = GrblArm(self._settings, clock)
+        """Bring it to rest whatever moves it, and see that it is."""
+        # Not through GrblArm, which has no say while something else moves the gantry.
         try:
-            arm.stop()
+            link = SerialLink(self._settings.port, self._settings.baud)
+        except ConnectError as error:
+            raise ConnectError(
+                f"{error}. Nothing was stopped: should the gantry move, use the emergency stop"
+            ) from error
+        try:
+            return stop_motion(link, clock, self._settings)
         finally:
-            arm.close()
-        return f"the gantry at {self._settings.port} was told to cancel its motion"
+            link.close()
 
     def recover(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
         """Reset and unlock after asking."""

@@ -65,12 +65,12 @@ class Conversation:
             )
         return heard
 
-    def status(self, wait_s: float) -> Status | None:
-        """A status report, asked for again and again."""
+    def status(self, wait_s: float, every_s: float = _ASK_EVERY_S) -> Status | None:
+        """A status report, asked for again and again: now and then a request gets no answer."""
         deadline_s = self.clock.now_s() + wait_s
         while self.clock.now_s() < deadline_s:
             self.link.write(b"?")
-            heard = self.listen(_ASK_EVERY_S, lambda message: isinstance(message, Status))
+            heard = self.listen(every_s, lambda message: isinstance(message, Status))
             if heard and isinstance(heard[-1], Status):
                 return heard[-1]
         return None

@@ -111,7 +111,11 @@ def jog(
 
 @arm_app.command()
 def stop(arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None) -> None:
-    """Stop whatever the arm does now, whoever started it. Not an emergency stop."""
+    """Stop what the arm does now, whoever started it, and see it at rest. No emergency stop.
+
+    Exit status 3 where it is not seen at rest. A gantry's port takes one program at a time: while
+    another holds it, this cannot reach the gantry, and that program or the emergency stop must.
+    """
     from drivers.clock import WallClock
 
     print(_kit(arm, host, port, baud).stop(WallClock()))
