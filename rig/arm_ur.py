@@ -8,9 +8,10 @@ from drivers.clock import Clock
 from drivers.errors import ConfigError
 from drivers.interfaces import Arm
 from drivers.ur.arm import UrArm
-from drivers.ur.recovery import recover_controller, stop_controller
+from drivers.ur.recovery import recover_controller
 from drivers.ur.settings import UrSettings
 from drivers.ur.status import read_status
+from drivers.ur.stopping import stop_arm
 from rig.arm_kits import Address, Json, own_settings
 
 
@@ -52,9 +53,8 @@ class UrKit:
         }
 
     def stop(self, clock: Clock) -> str:
-        """Stop the controller's program over its dashboard."""
-        reply = stop_controller(self._settings.host)
-        return f"the program on {self._settings.host} was told to stop: {reply}"
+        """Stop the controller's program over its dashboard, and see the arm at rest."""
+        return stop_arm(self._settings.host, clock)
 
     def recover(self, clock: Clock, confirm: Callable[[str], bool]) -> str:
         """Unlock and power up, then prove with a command of zero that the arm takes commands."""
