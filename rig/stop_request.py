@@ -21,9 +21,10 @@ class StopRequest:
 
     Only the main thread may enter it. Until somebody asks for the flag, nothing moves that would
     have to be ramped down, and the first signal raises KeyboardInterrupt at once: opening devices
-    can take long. A third signal, two seconds after the first, raises
-    KeyboardInterrupt, for a run that hangs; the arm then stops through the same clean-up as after
-    a crash. An output whose reader is gone counts as a request as well.
+    can take long. Further ones leave the clean-up alone for two seconds. A third signal, two
+    seconds after the first, raises KeyboardInterrupt, for a run that hangs; the arm then stops
+    through the same clean-up as after a crash. An output whose reader is gone counts as a request
+    as well.
     """
 
     def __init__(self, notice: str = "stopping the arm …", clock: Clock | None = None) -> None:
@@ -74,5 +75,10 @@ class StopRequest:
             self._first_s = self._clock.now_s()
             print(f"\n{self._notice}", file=sys.stderr, flush=True)
         patient = self._clock.now_s() <= self._first_s + _PATIENCE_S
-        if not self._asked or self._at_once or (self._received >= _INSISTING and not patient):
+        if self._asked and not self._at_once:
+            leave = self._received >= _INSISTING and not patient
+        else:
+            # A closing terminal says so twice: the second must not cut short what the first began.
+            leave = self._received == 1 or not patient
+        if leave:
             raise KeyboardInterrupt

@@ -117,8 +117,12 @@ def stop(arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None) 
     another holds it, this cannot reach the gantry, and that program or the emergency stop must.
     """
     from drivers.clock import WallClock
+    from rig.stop_request import StopRequest
 
-    print(_kit(arm, host, port, baud).stop(WallClock()))
+    kit = _kit(arm, host, port, baud)
+    with StopRequest("first the arm is stopped …") as interrupted:
+        interrupted()  # from here on a signal no longer leaves at once: half a stop is none
+        print(kit.stop(WallClock()))
 
 
 @arm_app.command()
@@ -131,12 +135,15 @@ def recover(
 ) -> None:
     """Explain why the arm stopped, ask, unlock it; no old motion resumes."""
     from drivers.clock import WallClock
+    from rig.stop_request import StopRequest
 
     def confirm(explanation: str) -> bool:
         print(explanation)
         return yes or typer.confirm("Is everybody clear of the arm, and shall it be unlocked?")
 
-    print(_kit(arm, host, port, baud).recover(WallClock(), confirm))
+    kit = _kit(arm, host, port, baud)
+    with StopRequest():
+        print(kit.recover(WallClock(), confirm))
 
 
 @arm_app.command()
@@ -149,15 +156,19 @@ def home(
 ) -> None:
     """Let a gantry find its zero at its switches; every axis moves. Ctrl-C stops it at once.
 
-    A program that is killed meanwhile cannot stop it: the controller then homes on by itself.
+    So do a closed terminal and SIGTERM. Only a program that is killed (SIGKILL) cannot stop it:
+    the controller then homes on by itself, until `rig arm stop` or the emergency stop.
     """
     from drivers.clock import WallClock
+    from rig.stop_request import StopRequest
 
     def confirm(explanation: str) -> bool:
         print(explanation)
         return yes or typer.confirm("Is the whole way of every axis clear, and shall it move?")
 
-    print(_kit(arm, host, port, baud).home(WallClock(), confirm))
+    kit = _kit(arm, host, port, baud)
+    with StopRequest():
+        print(kit.home(WallClock(), confirm))
 
 
 def _kit(

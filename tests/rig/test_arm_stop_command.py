@@ -9,6 +9,7 @@ import pytest
 
 from drivers.clock import WallClock
 from drivers.grbl.link import SerialLink
+from drivers.ur import stopping
 from drivers.ur.arm import UrArm
 from drivers.ur.dashboard import Dashboard
 from drivers.ur.settings import UrSettings
@@ -109,6 +110,7 @@ def test_a_ur_arm_whose_controller_refuses_is_not_called_stopped(
     """As one in local control may do."""
     refusal = "Failed to execute: stop"
     monkeypatch.setattr(Dashboard, "ask", lambda dashboard, command: refusal)
+    monkeypatch.setattr(stopping, "_REST_TIMEOUT_S", 0.5)
     outcome = rig("arm", "stop", "--arm", "ur", "--host", loopback.host)
     said_s = CLOCK.now_s()
     assert outcome.exit_code == 3

@@ -30,6 +30,18 @@ def test_before_anybody_asks_the_first_signal_leaves_at_once() -> None:
         assert stop_requested()
 
 
+def test_the_clean_up_after_the_first_signal_is_left_alone_for_a_while() -> None:
+    """A terminal that is closed says so twice."""
+    clock = SimulatedClock()
+    with StopRequest(clock=clock):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGHUP)
+        signal.raise_signal(signal.SIGHUP)
+        clock.sleep_until(2.5)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+
+
 def test_the_handlers_of_before_are_back_afterwards() -> None:
     before = signal.getsignal(signal.SIGINT)
     with StopRequest():
