@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import SafetyError
+from drivers.errors import OperateError, SafetyError
 from drivers.interfaces import ArmState, Frame
 from estimator.estimate import Correction, Estimate, Estimator
 from estimator.twist_history import MotionUnknownError, TwistHistory
@@ -78,11 +78,19 @@ class Fusion:
         self.reason = "no image arrived yet"
 
     def add_states(self, states: list[ArmState]) -> None:
-        """Record arm samples and the camera's motion they imply."""
+        """Record arm samples and the camera's motion they imply.
+
+        Raises OperateError for samples that are no numbers or do not come one after the other.
+        """
         if not states:
             return
         twists = np.array([state.twist_tool for state in states])
-        self._motion.extend([state.t_s for state in states], twists @ self._camera_from_tool.T)
+        try:
+            self._motion.extend([state.t_s for state in states], twists @ self._camera_from_tool.T)
+        except ValueError as error:
+            raise OperateError(
+                f"the arm reports what cannot be used ({error}): check its controller, start again"
+            ) from error
         self._note_uncertainty(states[-1])
         self._data.arm_states.extend(states)
         self._log.states(states)
