@@ -31,15 +31,13 @@ class UrListener:
         try:
             while True:
                 packets, arrival_s = self._stream.read(0.0)
-                samples = [self._sampler.sample(fields, arrival_s) for fields in packets]
                 states += [
                     ArmState(
                         t_s=one.t_s,
                         T_base_tool=one.T_base_tool,
                         twist_tool=to_tool_axes(one.T_base_tool[:3, :3], one.twist_base),
                     )
-                    for one in samples
-                    if one is not None
+                    for one in self._sampler.samples(packets, arrival_s)
                 ]
                 if not packets:
                     return states

@@ -75,14 +75,12 @@ def read_status(host: str, clock: Clock, look_s: float = 0.5, timeout_s: float =
 
 
 def _listen(stream: RtdeStream, clock: Clock, look_s: float) -> list[Sample]:
-    sampler, samples = Sampler(), []
+    sampler = Sampler()
+    samples: list[Sample] = []
     end_s = clock.now_s() + look_s
     while (remaining_s := end_s - clock.now_s()) > 0.0:
         packets, arrival_s = stream.read(remaining_s)
-        for fields in packets:
-            sample = sampler.sample(fields, arrival_s)
-            if sample is not None:
-                samples.append(sample)
+        samples += sampler.samples(packets, arrival_s)
     return samples
 
 

@@ -63,8 +63,7 @@ def _watch(host: str, clock: Clock) -> str | None:
         deadline_s = clock.now_s() + _REST_TIMEOUT_S
         while clock.now_s() < deadline_s:
             packets, arrival_s = stream.read(_LOOK_S)
-            found = [sampler.sample(fields, arrival_s) for fields in packets]
-            samples.extend(sample for sample in found if sample is not None)
+            samples.extend(sampler.samples(packets, arrival_s))
             while (
                 len(samples) > 1 and samples[-1].controller_s - samples[1].controller_s >= _LOOK_S
             ):

@@ -31,8 +31,17 @@ class TimeMap:
     def add(self, controller_s: float, arrival_s: float) -> float:
         """Learn from one arrival; the host instant at which the sample was true.
 
-        Never later than the arrival. A controller clock that went back starts the filter anew.
+        Never later than the arrival.
         """
+        self.learn(controller_s, arrival_s)
+        return self.at(controller_s)
+
+    def at(self, controller_s: float) -> float:
+        """The host instant of a controller instant, as far as arrivals have told."""
+        return controller_s + self._offset_at(controller_s)
+
+    def learn(self, controller_s: float, arrival_s: float) -> None:
+        """Take one arrival; a controller clock that went back starts the filter anew."""
         delta_s = arrival_s - controller_s
         if self._bucket is None or controller_s < self._bucket_start_s:
             self._restart(controller_s, delta_s)
@@ -42,11 +51,11 @@ class TimeMap:
             self._refit()
         elif delta_s < self._bucket[1] + self.drift * (controller_s - self._bucket[0]):
             self._bucket = (controller_s, delta_s)
-        offset_s = self._offset_s + self.drift * (controller_s - self._anchor_s)
-        if delta_s < offset_s:
+        if delta_s < self._offset_at(controller_s):
             self._offset_s, self._anchor_s = delta_s, controller_s
-            offset_s = delta_s
-        return controller_s + offset_s
+
+    def _offset_at(self, controller_s: float) -> float:
+        return self._offset_s + self.drift * (controller_s - self._anchor_s)
 
     def _restart(self, controller_s: float, delta_s: float) -> None:
         self._minima.clear()
