@@ -1,4 +1,4 @@
-"""``python -m drivers.ur.child``: the process that talks to the arm.
+"""The process that talks to the arm.
 
 It ends, with the arm braked and the program stopped, when told to and when its parent dies.
 Should it die itself, the controller's watchdog stops the arm.
@@ -153,7 +153,7 @@ def _abandon_after(timeout_s: float) -> None:
     timer.start()
 
 
-def main() -> int:
+def main() -> None:
     """Arguments: the parent's socket, the ring's file, the settings as JSON."""
     # Little work that must not wait; where the system does not grant it, it goes on without.
     with contextlib.suppress(OSError):
@@ -161,11 +161,7 @@ def main() -> int:
     parent = socket.socket(fileno=int(sys.argv[1]))
     ring = SampleRing(int(sys.argv[2]))
     settings = UrSettings.model_validate_json(sys.argv[3])
-    return Child(settings, parent, ring).run()
-
-
-if __name__ == "__main__":
-    status = main()
+    status = Child(settings, parent, ring).run()
     sys.stdout.flush()
     # Not through the interpreter's end: the vendor's threads may still run and crash it.
     os._exit(status)

@@ -5,11 +5,11 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 
 from drivers.clock import Clock
 from drivers.errors import ConnectError
+from drivers.own_python import own_python
 from drivers.ur.faults import ArmProcessError
 from drivers.ur.messages import MOST_BYTES, Command, Event, event_of
 from drivers.ur.ring import SampleRing, make_ring_file
@@ -38,7 +38,7 @@ class ChildLink:
         arguments = [str(theirs.fileno()), str(ring_file), own]
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "drivers.ur.child", *arguments],
+                [*own_python("drivers.ur.child"), *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=self._output,

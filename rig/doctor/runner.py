@@ -6,12 +6,12 @@ import os
 import select
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from drivers.clock import Clock
+from drivers.own_python import own_python
 from rig.doctor.checks import Check
 from rig.doctor.finding import Finding, Status, finding_of
 from rig.doctor.subject import Subject
@@ -21,7 +21,6 @@ _START_S = 120.0
 _LOOK_S = 0.1
 _END_S = 2.0
 _SAID_BYTES = 300
-_WORKER = "import sys; sys.path[:] = {path!r}; from rig.doctor.worker import run; run()"
 
 
 def run_checks(
@@ -99,7 +98,7 @@ class _Worker:
         try:
             self._process = subprocess.Popen(
                 # Not -m, which would search the current directory before this program's own.
-                [sys.executable, "-P", "-c", _WORKER.format(path=sys.path), str(theirs)],
+                [*own_python("rig.doctor.worker", "run"), str(theirs)],
                 stdin=subprocess.PIPE,
                 stdout=self._output,
                 stderr=self._output,

@@ -4,7 +4,6 @@ import contextlib
 import os
 import socket
 import subprocess
-import sys
 import tempfile
 from importlib.util import find_spec
 from types import TracebackType
@@ -12,6 +11,7 @@ from typing import Self
 
 from drivers.clock import Clock
 from drivers.errors import ConfigError, ConnectError
+from drivers.own_python import own_python
 from rig.config_safety import SafetyConfig
 from rig.outcome import LiveStatus
 from rig.page.address import PageAddress
@@ -27,7 +27,6 @@ STATES_PER_S = 30.0
 _READY_TIMEOUT_S = 60.0
 _END_TIMEOUT_S = 3.0
 _SAID_BYTES = 600
-_CHILD = "import sys; sys.path[:] = {path!r}; from rig.page.child import main; main()"
 
 
 class LivePage:
@@ -55,8 +54,7 @@ class LivePage:
         files = (theirs.fileno(), board_file)
         try:
             self._process = subprocess.Popen(
-                # Not -m, which would search the current directory before this program's own.
-                [sys.executable, "-P", "-c", _CHILD.format(path=sys.path), *map(str, files)],
+                [*own_python("rig.page.child"), *map(str, files)],
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=self._output,

@@ -9,12 +9,12 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 from typing import Protocol
 
 from drivers.clock import Clock
 from drivers.errors import ConnectError, DeviceTimeoutError, OperateError, RigError
+from drivers.own_python import own_python
 from rig.vision.images import ImageRing
 from rig.vision.messages import (
     BEGIN,
@@ -38,7 +38,6 @@ _SILENCE_LIMIT_S = 1.5
 _END_TIMEOUT_S = 3.0
 _STATUS_TIMEOUT_S = 0.005
 _SAID_BYTES = 600
-_CHILD = "import sys; sys.path[:] = {path!r}; from rig.vision.child import main; main()"
 
 
 class Feed(Protocol):
@@ -75,8 +74,7 @@ class ProcessVision:
         files = [theirs.fileno()] + ([] if feed is None else [feed.file])
         try:
             self._process = subprocess.Popen(
-                # Not -m, which would search the current directory before this program's own.
-                [sys.executable, "-P", "-c", _CHILD.format(path=sys.path), *map(str, files)],
+                [*own_python("rig.vision.child"), *map(str, files)],
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=self._output,

@@ -1,11 +1,11 @@
 """The emulated gantry in a child process, so that it keeps time whatever its client does."""
 
 import subprocess
-import sys
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from drivers.own_python import own_python
 from sim_backend.loopback_grbl.control import ControlClient
 
 _END_S = 5.0
@@ -22,7 +22,7 @@ class LoopbackGantryProcess:
         self.port = port
         self._process = subprocess.Popen(
             [
-                *(sys.executable, "-m", "sim_backend.loopback_grbl", "--link", str(port)),
+                *(*own_python("sim_backend.loopback_grbl.__main__"), "--link", str(port)),
                 *("--end-with-stdin", *arguments),
             ],
             stdin=subprocess.PIPE,

@@ -3,13 +3,13 @@
 import json
 import socket
 import subprocess
-import sys
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.own_python import own_python
 from sim_backend.loopback_ur.kinematics import pose_and_jacobian
 from sim_backend.loopback_ur.server import CONTROL_PORT
 
@@ -80,7 +80,7 @@ class LoopbackProcess:
         version: str | None = None,
     ) -> None:
         self.host = host
-        command = [sys.executable, "-m", "sim_backend.loopback_ur", "--host", host]
+        command = [*own_python("sim_backend.loopback_ur.__main__"), "--host", host]
         command += ["--lifetime-s", str(lifetime_s), "--unlock-after-s", str(unlock_after_s)]
         command += ["--end-with-stdin", f"--tcp-offset={_comma(tcp_offset)}"]
         if q_start is not None:
