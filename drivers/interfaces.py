@@ -86,6 +86,13 @@ class Arm(Protocol):
         """
         ...
 
+    def tcp_offset(self) -> FloatArray | None:
+        """The tool frame in the flange's (6,): x, y, z in m and a rotation vector in rad.
+
+        None for an arm that does not keep one which somebody could change, or does not tell it.
+        """
+        ...
+
     def stop(self) -> None:
         """Decelerate to standstill as fast as the arm may; returns at once, can be repeated."""
         ...

@@ -1,6 +1,7 @@
 """From a configuration to devices: the only place that chooses simulated or real."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib import import_module
 from types import TracebackType
@@ -18,6 +19,7 @@ from estimator.image.tracker import TargetTracker, warm_up
 from rig.config import RigConfig, TargetKind
 from rig.config_devices import ArmConfig, CameraConfig
 from rig.image_size import SizedVision
+from rig.tcp_offset import check_tcp
 from rig.vision import Vision
 from rig.vision.inline import InlineVision
 from rig.vision.messages import Job
@@ -165,6 +167,7 @@ def _simulated(config: RigConfig, target: TargetKind, realtime: bool) -> Rig:
         here = ThreadedVision if realtime else InlineVision
         vision = here(devices.camera, _tracker(config, target, intrinsics))
     vision = _sized(vision, config) if devices.features is None else vision
+    check_tcp(devices.arm, config.calibration.tcp_offset)
     devices.everything_ready()
     return Rig(
         arm=devices.arm,
@@ -183,11 +186,12 @@ def _hardware(config: RigConfig, target: TargetKind) -> Rig:
     intrinsics, T_tool_camera = given_geometry(config, None)
     clock = WallClock()
     vision = _real_vision(config, target, intrinsics, clock)
-    try:
+    with ExitStack() as opened:
+        opened.callback(vision.close)
         arm = open_arm(config.arm, clock)
-    except BaseException:
-        vision.close()
-        raise
+        opened.callback(arm.close)
+        check_tcp(arm, config.calibration.tcp_offset)
+        opened.pop_all()
     return Rig(arm, vision, clock, True, intrinsics, T_tool_camera)
 
 

@@ -9,6 +9,7 @@ from rig.calibration.result_check import check_usable
 from rig.config import RigConfig
 from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
 from rig.fingerprints import fingerprints
+from rig.tcp_offset import tcp_of
 from sim_backend import drawings
 
 
@@ -83,6 +84,7 @@ def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
             "intrinsics": intrinsics_config(lens),
             "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
             "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
+            "tcp_offset": tcp_of(hand_eye.depends_on),
             "latency_s": latency.latency_s,
             "row_time_s": latency.row_time_s,
         },

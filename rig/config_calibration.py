@@ -47,6 +47,9 @@ class CalibrationConfig(Section):
     intrinsics: IntrinsicsConfig | None = None
     tool_camera_xyz_m: tuple[Finite, Finite, Finite] | None = None
     tool_camera_rotvec_rad: tuple[Finite, Finite, Finite] | None = None
+    # The arm's TCP (x, y, z in m, rotation vector in rad) that the transform above holds for;
+    # where the arm tells another one, a run refuses.
+    tcp_offset: tuple[Finite, Finite, Finite, Finite, Finite, Finite] | None = None
     latency_s: Finite = 0.0  # by which the images' stamps are late
     row_time_s: Finite = 0.0  # by which each row of an image is exposed after the one above it
     board: BoardConfig = BoardConfig()

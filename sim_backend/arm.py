@@ -84,6 +84,9 @@ class SimulatedArm:
             )
         self._world.command(twist, hold_s)
 
+    def tcp_offset(self) -> None:
+        """Nothing: where the tool is follows from the configuration."""
+
     def stop(self) -> None:
         """Ramp to standstill at the acceleration limits."""
         self._world.command(np.zeros(6), 0.0)

@@ -100,6 +100,9 @@ class GrblArm:
         with self._lock:
             self._connected().core.command(twist_tool, hold_s, self._clock.now_s())
 
+    def tcp_offset(self) -> None:
+        """Nothing: where the tool is follows from ``settings.wrist``."""
+
     def stop(self) -> None:
         """Cancel the jog; returns at once, can be repeated."""
         with self._lock:

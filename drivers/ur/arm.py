@@ -1,6 +1,5 @@
 """A Universal Robots arm behind the ``Arm`` interface."""
 
-import hashlib
 import math
 from collections.abc import Callable
 
@@ -57,12 +56,12 @@ class UrArm:
         ready = self._link.ready
         self._t_std_s = ready.round_trip_s / math.sqrt(12.0)
         self._noise = noise_at_rest(self._first_samples())
-        self.tcp_offset = ready.tcp_offset  # (x, y, z, rx, ry, rz), m and rad
+        self._tcp_offset = np.array(ready.tcp_offset)
         pinned = self._settings.tcp_offset
-        if pinned is not None and not _same(pinned, self.tcp_offset):
+        if pinned is not None and not _same(pinned, self._tcp_offset):
             self._link.close(_order(Order.CLOSE))
             raise ConnectError(
-                f"the controller at {self._settings.host} has the TCP {_text(self.tcp_offset)}, "
+                f"the controller at {self._settings.host} has the TCP {_text(self._tcp_offset)}, "
                 f"the rig was calibrated with {_text(pinned)}: set it back on the pendant or "
                 "calibrate again"
             )
@@ -73,12 +72,6 @@ class UrArm:
         while ring.count < FEWEST_SAMPLES and clock.now_s() < deadline_s:
             clock.sleep_until(clock.now_s() + 0.01)
         return ring.since(0)[0]
-
-    @property
-    def tcp_hash(self) -> str:
-        """A short digest of the TCP, for calibrations to name what they depend on."""
-        rounded = ",".join(f"{value:.5f}" for value in np.round(self.tcp_offset, 5) + 0.0)
-        return hashlib.sha256(rounded.encode()).hexdigest()[:12]
 
     @property
     def child_pid(self) -> int:
@@ -107,7 +100,7 @@ class UrArm:
         if sample is None:
             return None
         if not self._identified:
-            self._kinematics = identify(sample.q_rad, sample.T_base_tool, self.tcp_offset)
+            self._kinematics = identify(sample.q_rad, sample.T_base_tool, self._tcp_offset)
             self._identified = True
         return None if self._kinematics is None else self._kinematics.joints(sample.q_rad)
 
@@ -126,6 +119,10 @@ class UrArm:
             )
         self._check()
         self._link.send(Command(Order.TWIST, twist, self._clock.now_s() + hold_s))
+
+    def tcp_offset(self) -> FloatArray:
+        """The TCP that was set on the controller at connecting (6,); another one is a fault."""
+        return self._tcp_offset.copy()
 
     def stop(self) -> None:
         """Brake to standstill; never raises, since a dead link stops through the watchdog."""
@@ -181,9 +178,11 @@ class UrArm:
                 f"the arm at {host} has not reported for {age_s:.3f} s: check the network and the "
                 "controller, then run `rig arm recover`"
             )
-        if np.all(np.isfinite(sample.tcp_offset)) and not _same(sample.tcp_offset, self.tcp_offset):
+        if np.all(np.isfinite(sample.tcp_offset)) and not _same(
+            sample.tcp_offset, self._tcp_offset
+        ):
             return TcpChangedError(
-                f"the TCP of the arm at {host} changed from {_text(self.tcp_offset)} to "
+                f"the TCP of the arm at {host} changed from {_text(self._tcp_offset)} to "
                 f"{_text(sample.tcp_offset)}: the calibration no longer holds"
             )
         return fault_of(host, sample.safety_status_bits, sample.robot_mode, sample.runtime_state)

@@ -89,6 +89,10 @@ class RecordedArm:
         sent = np.array(twist_tool)
         self._log.command(self._clock.now_s(), sent, sent, self._measured, ())
 
+    def tcp_offset(self) -> FloatArray | None:
+        """The tool frame in the flange's, see ``Arm``."""
+        return self._arm.tcp_offset()
+
     def stop(self) -> None:
         """Decelerate to standstill."""
         self._arm.stop()

@@ -36,12 +36,22 @@ class Store:
         self._begun = resume
         self.stills: list[Still] = []
         self.recording: Recording | None = None
+        self._resumed: dict[str, str] | None = None  # what the data resumed were taken under
         with self._writing():
             directory.mkdir(parents=True, exist_ok=True)
             _replace(directory / "writable", b"")
             (directory / "writable").unlink()
         if resume:
             self._load()
+
+    def also_under(self, conditions: Mapping[str, str]) -> None:
+        """Add conditions that only open devices tell, before anything is collected.
+
+        Raises ConfigError when data that are resumed were taken under others.
+        """
+        self._conditions.update(conditions)
+        if self._resumed is not None:
+            self._check_same(self._resumed)
 
     def add_still(self, still: Still) -> None:
         """Keep a still; it is on disk when this returns."""
@@ -111,24 +121,32 @@ class Store:
         path = self.directory / _CONDITIONS
         if not path.exists():
             raise ConfigError(f"{self.directory} holds nothing to resume: leave --resume out")
-        try:
-            before = json.loads(path.read_text(encoding="utf-8"))
-            changed = [k for k, now in self._conditions.items() if before.get(k) != now]
-            if not changed:
-                stills = sorted(self.directory.glob("still-*.npz"))
-                self.stills = [_still(one) for one in stills]
-                if (self.directory / _RECORDING).exists():
-                    self.recording = _recording(self.directory / _RECORDING)
-        except (OSError, ValueError, KeyError, AttributeError, BadZipFile) as error:
-            raise ConfigError(
-                f"the data in {self.directory} cannot be read ({error}): leave --resume out to "
-                "start anew"
-            ) from error
+        with self._readable():
+            before = dict(json.loads(path.read_text(encoding="utf-8")))
+        self._resumed = before
+        self._check_same(before)
+        with self._readable():
+            self.stills = [_still(one) for one in sorted(self.directory.glob("still-*.npz"))]
+            if (self.directory / _RECORDING).exists():
+                self.recording = _recording(self.directory / _RECORDING)
+
+    def _check_same(self, before: Mapping[str, str]) -> None:
+        changed = [key for key, now in self._conditions.items() if before.get(key) != now]
         if changed:
             raise ConfigError(
                 f"cannot resume: {', '.join(changed)} changed since the data in "
                 f"{self.directory} were taken; leave --resume out to start anew"
             )
+
+    @contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError, TypeError, KeyError, BadZipFile) as error:
+            raise ConfigError(
+                f"the data in {self.directory} cannot be read ({error}): leave --resume out to "
+                "start anew"
+            ) from error
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -159,6 +159,7 @@ def _on_the_rig(step: Step, request: Request) -> None:
     from rig.calibration_run.summary import json_of, table
     from rig.fingerprints import fingerprints
     from rig.stop_request import StopRequest
+    from rig.tcp_offset import tcp_fingerprint
 
     config = request.config()
     path, depends_on = calibration_path(config), fingerprints(config)
@@ -180,6 +181,8 @@ def _on_the_rig(step: Step, request: Request) -> None:
         open_bench(config, request.realtime, by_hand) as bench,
         open_calibration_log(log_path, config, bench, realtime) as log,
     ):
+        depends_on |= tcp_fingerprint(bench.arm)
+        store.also_under(depends_on)
         shown = ConsoleProgress(console)
         progress = RecordedProgress(shown, log, bench)
         watched = recorded(bench, log)

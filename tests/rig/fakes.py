@@ -52,6 +52,7 @@ class KinematicArm:
     commands: list[tuple[float, np.ndarray]] = field(default_factory=list)
     stops: int = 0
     closed: bool = False
+    tcp: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         self._t_s = self.clock.now_s()
@@ -73,6 +74,9 @@ class KinematicArm:
         self._advance()
         self.commands.append((self.clock.now_s(), np.array(twist_tool)))
         self._twist, self._until_s = np.array(twist_tool), self.clock.now_s() + hold_s
+
+    def tcp_offset(self) -> np.ndarray | None:
+        return self.tcp
 
     def stop(self) -> None:
         self._advance()

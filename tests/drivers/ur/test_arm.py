@@ -3,6 +3,8 @@
 What it owes as an ``Arm`` is held by ``tests/contract``; here is what is its own.
 """
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,7 @@ from drivers.ur.faults import (
     ProgramStoppedError,
     ProtectiveStopError,
 )
+from drivers.ur.listener import UrListener
 from drivers.ur.settings import UrSettings
 from sim_backend.loopback_ur.kinematics import transform
 from tests.drivers.ur.loopback import drive, last_motion_s
@@ -91,19 +94,21 @@ def test_settings_may_carry_keys_of_the_rig(loopback, arm):
 
 
 def test_a_pinned_tcp_must_be_the_controllers(loopback, arm):
-    assert np.allclose(arm.tcp_offset, 0.0, atol=1e-12)
+    assert np.allclose(arm.tcp_offset(), 0.0, atol=1e-12)
     arm.close()
     pinned = UrSettings(host=loopback.host, tcp_offset=(0.0, 0.0, 0.12, 0.0, 0.0, 0.0))
     with pytest.raises(ConnectError, match=r"0\.12000.*calibrate again"):
         UrArm(pinned, CLOCK)
 
 
-def test_the_tcp_digest_depends_on_the_tcp_and_nothing_else(arm):
-    digest = arm.tcp_hash
-    arm.tcp_offset = tuple(x + 1e-9 for x in arm.tcp_offset)
-    assert arm.tcp_hash == digest
-    arm.tcp_offset = (0.001, *arm.tcp_offset[1:])
-    assert arm.tcp_hash != digest
+def test_who_only_listens_hears_of_the_same_tcp(loopback, settings):
+    offset = (0.01, -0.02, 0.12, 0.1, -0.2, 0.3)
+    loopback.control.tcp(offset)
+    try:
+        with closing(UrListener(settings, CLOCK)) as listener:
+            assert np.allclose(listener.tcp_offset(), offset)
+    finally:
+        loopback.control.tcp((0.0,) * 6)
 
 
 def test_after_close_the_arm_is_refused_and_its_program_has_ended(arm, loopback, settings):

@@ -43,7 +43,7 @@ def test_a_cb3_is_driven_and_stopped_as_any_other(cb3):
         assert drive(arm, TWIST, 0.2) is None
         arm.read_states()
         assert drive(arm, TWIST, 0.4) is None
-        assert np.allclose(arm.tcp_offset, 0.0)
+        assert np.allclose(arm.tcp_offset(), 0.0)
         arm.stop()
         stopped_s = CLOCK.now_s()
         CLOCK.sleep_until(stopped_s + 0.4)

@@ -87,7 +87,7 @@ class LedArm:
     def command_twist(self, twist_tool: np.ndarray, hold_s: float) -> None:
         raise AssertionError("nobody may command it")
 
-    stop = close = lambda self: None
+    stop = close = tcp_offset = lambda self: None
 
 
 def test_an_arm_led_by_hand_is_waited_for_and_never_commanded() -> None:
