@@ -61,6 +61,9 @@ def write_config(run_dir: Path, config: RigConfig) -> None:
 
 
 def write_summary(run_dir: Path, summary: Mapping[str, Json]) -> None:
-    """Write ``summary.json``."""
+    """Write ``summary.json`` as a whole or not at all; one that is there is replaced."""
     text = json.dumps(dict(summary), indent=2, allow_nan=False)
-    (run_dir / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
+    path = run_dir / SUMMARY_NAME
+    partial = path.with_name(f"{path.name}.partial")
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(path)

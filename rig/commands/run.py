@@ -90,7 +90,7 @@ def run(
     from rig.page.address import page_address
     from rig.page.watching import watching
     from rig.recorded.read import read_run
-    from rig.records import make_run_dir, write_summary
+    from rig.records import make_run_dir
     from rig.report.write import write_reports
     from rig.run import execute
     from rig.stop_request import StopRequest
@@ -118,16 +118,20 @@ def run(
                 *(config, target, run_dir, realtime, shown, stopped, source),
                 attachments=tuple(p for p in [calibration_path(config)] if str(p) == source),
             )
-        result.summary.update(_limits(result, config, calibration))
+        # First of all: what was measured is not to be lost to whatever goes wrong from here on.
+        _write(run_dir, result.summary)
+        limits = _limits(result, config, calibration)
+        if limits:
+            result.summary.update(limits)
+            _write(run_dir, result.summary)
         if as_json:
             print(json.dumps({key: result.summary[key] for key in JSON_KEYS}), flush=True)
         console.print(table(result.summary))
-        try:
-            write_summary(run_dir, result.summary)
-            if report:
+        if report:
+            try:
                 write_reports([read_run(run_dir)], run_dir)
-        except (OSError, ConfigError) as error:  # what was measured stands all the same
-            warn(f"warning: {run_dir} is not complete: {error}")
+            except (OSError, ConfigError) as error:  # what was measured stands all the same
+                _not_complete(run_dir, error)
     _explain(result, config.estimator.chosen == "observer")
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
@@ -159,7 +163,11 @@ def _share(text: str) -> float:
 def _limits(
     result: "RunResult", config: "RigConfig", calibration: "CalibrationFile | None"
 ) -> "dict[str, Json]":
-    """What the calibration limits the radius to, where it says how sure it is."""
+    """What the calibration limits the radius to; empty where that is not known.
+
+    A run's result stands without it, so neither Ctrl-C nor a failure in here ends the program.
+    """
+    from estimator.twist_history import MotionUnknownError
     from rig.calibration.spread import covariance_of
     from rig.calibration_limits import calibration_limits
     from rig.run import make_observer
@@ -167,9 +175,28 @@ def _limits(
 
     covariance = None if calibration is None else covariance_of(calibration)
     if covariance is None or result.summary["radius_m"] is None:
-        return limits_of(None)
-    data = result.outcome.data
-    return limits_of(calibration_limits(data, config, result.intrinsics, covariance, make_observer))
+        return {}
+    data, lens = result.outcome.data, result.intrinsics
+    try:
+        return limits_of(calibration_limits(data, config, lens, covariance, make_observer))
+    except KeyboardInterrupt:
+        warn("interrupted: what the calibration limits the radius to was not worked out")
+    except (MotionUnknownError, ArithmeticError, ValueError) as error:
+        warn(f"warning: what the calibration limits the radius to is not known: {error}")
+    return {}
+
+
+def _write(run_dir: Path, summary: "dict[str, Json]") -> None:
+    from rig.records import write_summary
+
+    try:
+        write_summary(run_dir, summary)
+    except OSError as error:  # what was measured stands all the same
+        _not_complete(run_dir, error)
+
+
+def _not_complete(run_dir: Path, error: Exception) -> None:
+    warn(f"warning: {run_dir} is not complete: {error}")
 
 
 def _explain(result: "RunResult", transient: bool) -> None:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from rig import calibration_limits
 from rig.log.lines import lines
 from rig.log.reader import open_log
 from tests.rig.command_line import Outcome, rig
@@ -31,6 +32,8 @@ TRUTH = [
     "sim.camera.latency_s=0.075",
     "sim.camera.stamps=arrival",
 ]
+
+SETTINGS = [f"--set={s}" for s in [*TRUTH, SMALL[-1]]]
 
 
 def calibrate(*steps: str, settings: list[str]) -> Outcome:
@@ -81,7 +84,7 @@ def test_the_report_shows_every_step(folder: Path) -> None:
 
 
 def test_a_run_takes_the_calibration_and_measures_the_ball(folder: Path) -> None:
-    done = rig("run", "--target", "sphere", "--json", *[f"--set={s}" for s in [*TRUTH, SMALL[-1]]])
+    done = rig("run", "--target", "sphere", "--json", *SETTINGS)
     assert done.exit_code == 0, done.stderr
     assert "calibration: calibration/sim.yaml" in done.stderr
     summary = json.loads(done.stdout)
@@ -91,9 +94,28 @@ def test_a_run_takes_the_calibration_and_measures_the_ball(folder: Path) -> None
     assert "the calibration limits it to" in done.stderr
 
 
+@pytest.mark.parametrize("trouble", [KeyboardInterrupt(), ValueError("not to be solved")])
+def test_a_run_s_result_does_not_wait_for_what_limits_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, trouble: BaseException
+) -> None:
+    out = folder / f"limits-{type(trouble).__name__}"
+
+    def fail(*_: object) -> None:
+        assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["radius_m"] > 0.0
+        raise trouble
+
+    monkeypatch.setattr(calibration_limits, "calibration_limits", fail)
+    short = ["--duration", "1.0", "--no-report", "--out", str(out)]
+    done = rig("run", "--target", "sphere", "--json", *short, *SETTINGS)
+    assert done.exit_code == 0, done.stderr
+    assert "what the calibration limits the radius to" in done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["radius_m"] > 0.0 and summary["radius_calibration_std_m"] is None
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["frames"] > 20
+
+
 def test_without_it_the_radius_is_off_by_far_more(folder: Path) -> None:
-    hidden = [f"--set={s}" for s in [*TRUTH, SMALL[-1]]]
-    done = rig("run", "--target", "sphere", "--uncalibrated", "--json", *hidden)
+    done = rig("run", "--target", "sphere", "--uncalibrated", "--json", *SETTINGS)
     assert done.exit_code == 0, done.stderr
     summary = json.loads(done.stdout)
     assert abs(summary["relative_error"]) > 9e-3
