@@ -54,12 +54,19 @@ def camera(subject: Subject, clock: Clock) -> Finding:
     try:
         device = open_camera(settings, clock)
     except RigError as error:
-        return Finding("camera", Status.FAIL, str(error), "rig camera list; see camera.source")
+        return Finding("camera", Status.FAIL, str(error), _where_to_look(str(settings.source)))
     try:
         result = check_camera(device, clock, _WATCH_QUICK_S if subject.quick else _WATCH_S)
     finally:
         device.close()
     return judge_camera(report(result), str(settings.source))
+
+
+def _where_to_look(source: str) -> str:
+    """What to type when a camera cannot be opened: another machine's is in no list."""
+    if "://" in source:
+        return f"rig camera check --source {source}"
+    return "rig camera list; see camera.source"
 
 
 def judge_camera(figures: Mapping[str, object], source: str) -> Finding:
