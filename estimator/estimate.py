@@ -13,6 +13,9 @@ from estimator.twist_history import TwistHistory
 
 FloatArray = NDArray[np.float64]
 
+# Of a normal distribution, 95 % lie within so many standard deviations.
+DEVIATIONS_95 = 1.96
+
 
 class Correction(Enum):
     """What became of an image handed to an estimator."""
@@ -51,6 +54,14 @@ class Estimate:
         """Half the width of R's 68 % interval; None where it is unknown or has no upper end."""
         low_m, high_m = self.radius_interval_m(1.0)
         return None if high_m is None or low_m is None else 0.5 * (high_m - low_m)
+
+    @property
+    def interval_share(self) -> float:
+        """How far the ends of R's 95 % interval are from R̂, as a share of it; inf: unknown."""
+        low_m, high_m = self.radius_interval_m(DEVIATIONS_95)
+        if self.chi <= 0.0 or low_m is None or high_m is None:
+            return math.inf
+        return max(high_m * self.chi - 1.0, 1.0 - low_m * self.chi)
 
     def radius_interval_m(self, deviations: float) -> tuple[float | None, float | None]:
         """R where χ̂ is taken so many standard deviations up and down: never negative.

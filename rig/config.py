@@ -8,8 +8,9 @@ from pydantic import Field, model_validator
 from rig.config_calibration import CalibrationConfig
 from rig.config_devices import ArmConfig, CameraConfig, SimArm, SimCamera
 from rig.config_log import LogConfig
+from rig.config_motion import MotionConfig
 from rig.config_safety import SafetyConfig
-from rig.config_section import Finite, NotNegative, Positive, Section
+from rig.config_section import NotNegative, Positive, Section
 from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
@@ -84,21 +85,6 @@ class EstimatorConfig(Section):
         return self.radius_range_m or (self.radius_guess_m / 3.0, self.radius_guess_m * 3.0)
 
 
-class MotionConfig(Section):
-    """How the camera moves, in its own axes."""
-
-    # information: to where the radius becomes known soonest; circle: a plain arc.
-    policy: Literal["constant", "paper", "information", "circle"] = "constant"
-    velocity_m_s: tuple[Finite, Finite, Finite] = (-0.05, 0.0, 0.0)
-    k1: NotNegative = 10.0  # eq. (24): holds the norm of v
-    k2: NotNegative = 1.0  # eq. (24): turns v towards the largest sigma1²
-    circle_radius_m: Positive = 0.03
-    # How far information may take the camera from the target's surface, for the sake of focus;
-    # how near it may, stands under safety.
-    max_target_distance_m: Positive = 1.0
-    centring_gain_per_s: Annotated[float, Field(gt=0, le=10)] = 5.0
-
-
 class RunConfig(Section):
     """How long a run lasts and how fast it ticks."""
 
@@ -151,6 +137,8 @@ class RigConfig(Section):
                 "motion.policy = information needs an estimator that states how sure it is: "
                 f"set estimator.kind=kalman{self.estimator.why_observer}"
             )
+        if self.motion.policy == "servo":
+            self._check_servo()
         if self.arm.hold_s <= 1.0 / self.run.control_rate_hz:
             raise ValueError(
                 f"arm.hold_s = {self.arm.hold_s:.3g} is not longer than one tick "
@@ -163,3 +151,29 @@ class RigConfig(Section):
                 f"run.duration_s = {self.run.duration_s:.3g}: no image would arrive in time"
             )
         return self
+
+    @property
+    def ends_when_settled(self) -> bool:
+        """Whether a run is over as soon as its estimate is good enough, and a servo arrived."""
+        run = self.run
+        return run.until_converged or run.until_share is not None or self.motion.policy == "servo"
+
+    @property
+    def wanted_share(self) -> float:
+        """The half-width of R's 95 % interval, as a share, at which the estimate is good enough."""
+        return self.run.converged_fraction if self.run.until_share is None else self.run.until_share
+
+    def _check_servo(self) -> None:
+        """Raise ValueError for a distance that the camera may not have."""
+        least_m, most_m = self.safety.min_target_distance_m, self.motion.max_target_distance_m
+        distance_m = self.motion.servo.distance_m
+        if distance_m < least_m:
+            raise ValueError(
+                f"motion.servo.distance_m = {distance_m:g} is nearer to the target's surface than "
+                f"safety.min_target_distance_m = {least_m:g} allows"
+            )
+        if distance_m > most_m:
+            raise ValueError(
+                f"motion.servo.distance_m = {distance_m:g} is farther from the target's surface "
+                f"than motion.max_target_distance_m = {most_m:g} allows"
+            )

@@ -4,15 +4,12 @@ from typing import Protocol
 
 import numpy as np
 
-from estimator.estimate import Estimate
 from estimator.gain import REST_SIGMA, damping_rates
 from estimator.second_order import exact_step
 from rig.config import RigConfig
 from rig.run_data import RunData
 
 _WINDOW_S = 1.0
-# Of a normal distribution, 95 % lie within so many standard deviations.
-DEVIATIONS_95 = 1.96
 # Fewer images cannot have shown whether they agree.
 _FEWEST_IMAGES = 6
 
@@ -41,15 +38,6 @@ def make_convergence(config: RigConfig, data: RunData) -> Convergence:
     return IntervalConvergence(config, data)
 
 
-def interval_share(estimate: Estimate) -> float:
-    """How far the ends of the stated 95 % interval of R are from R̂, as a share of it."""
-    radius_m = estimate.radius_m
-    low_m, high_m = estimate.radius_interval_m(DEVIATIONS_95)
-    if radius_m is None or low_m is None or high_m is None:
-        return float("inf")
-    return max(high_m / radius_m - 1.0, 1.0 - low_m / radius_m)
-
-
 class IntervalConvergence:
     """Follows the stated 95 % interval of the radius."""
 
@@ -62,7 +50,7 @@ class IntervalConvergence:
     def update(self) -> None:
         """Look at the newest update."""
         if self._data.updates:
-            self.remaining_fraction = min(1.0, interval_share(self._data.updates[-1]))
+            self.remaining_fraction = min(1.0, self._data.updates[-1].interval_share)
 
     def reached(self) -> bool:
         """Whether the interval is inside the share asked for, and nothing contradicts it."""

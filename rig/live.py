@@ -186,12 +186,14 @@ def rows(status: LiveStatus, rates: Rates) -> list[tuple[str, str]]:
         residual = f"{estimate.residual:.1e}"
     share = 100.0 * status.remaining_fraction
     stated = estimate is not None and estimate.variance is not None
+    servo = [("servo", status.servo)] if status.servo else []
     return [
         ("R", radius),
         ("residual", residual),
         ("95 % interval", f"± {share:.2g} %") if stated else ("transient left", f"{share:.1f} %"),
         ("camera", f"{rates.camera_fps:.1f} fps ({status.frames_lost} lost)"),
         ("loop", f"{rates.loop_hz:.1f} Hz ({status.overruns} overruns)"),
+        *servo,
         ("speed", f"{status.speed_m_s * 1e3:.1f} mm/s"),
         ("state", status.state),
         ("limited by", ", ".join(status.limited_by) or "nothing"),

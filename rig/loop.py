@@ -8,7 +8,7 @@ import numpy as np
 from drivers.clock import Clock
 from drivers.errors import DeviceTimeoutError, RigError, SafetyError
 from drivers.interfaces import Arm, ArmState
-from estimator.active.controller import Controller
+from estimator.active.controller import CameraMotion
 from estimator.estimate import Estimate
 from rig.commander import Commander
 from rig.config import RigConfig
@@ -40,7 +40,7 @@ class RunLoop:
         arm: Arm,
         vision: Vision,
         fusion: Fusion,
-        controller: Controller,
+        controller: CameraMotion,
         limiter: Limiter,
         config: RigConfig,
         data: RunData,
@@ -66,7 +66,9 @@ class RunLoop:
         self._supervisor = Supervisor(config.safety)
         self._convergence = make_convergence(config, data)
         self._stats = TickStats()
-        self._showing = Showing(on_tick, fusion, data, self._stats, self._convergence)
+        self._showing = Showing(
+            on_tick, fusion, data, self._stats, self._convergence, controller.status
+        )
         self._started_s = 0.0
         self._last_s = 0.0  # the tick before this one
         self._first_feature_s: float | None = None
@@ -142,7 +144,7 @@ class RunLoop:
             self._convergence.update()
             verdict = self._judge(now_s, state, estimate)
             if verdict.ending is None:
-                verdict = self._own_ending(now_s) or verdict
+                verdict = self._own_ending(now_s, estimate) or verdict
             if verdict.ending is not None:
                 return verdict
             if state is not None:
@@ -197,7 +199,7 @@ class RunLoop:
         if self._target_state.partition(":")[0] != before:
             self._log.event(now_s, "target " + self._target_state.partition(":")[0], missing)
 
-    def _own_ending(self, now_s: float) -> Verdict | None:
+    def _own_ending(self, now_s: float, estimate: Estimate | None) -> Verdict | None:
         """The verdict when the run is over without any trouble."""
         run = self._config.run
         if self._stop_requested():
@@ -205,8 +207,8 @@ class RunLoop:
         if self._first_feature_s is not None:
             if now_s - self._first_feature_s >= run.duration_s:
                 return Verdict(RigState.STOPPING, ending=Ending.TIME)
-            asked = run.until_converged or run.until_share is not None
-            if asked and self._convergence.reached():
+            settled = self._config.ends_when_settled and self._convergence.reached()
+            if settled and estimate is not None and self._controller.arrived(estimate):
                 return Verdict(RigState.STOPPING, ending=Ending.CONVERGED)
         return None
 

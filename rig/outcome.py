@@ -40,6 +40,7 @@ class LiveStatus:
     late_s: float  # by which the newest tick began after its point on the grid
     arm: ArmState | None  # its newest sample
     sighting: Sighting | None  # the newest image and what was measured in it
+    servo: str = ""  # how far a servo is from where it has to get
 
 
 @dataclass(frozen=True, slots=True)

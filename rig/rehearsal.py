@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimator.active.controller import Controller
+from estimator.active.controller import CameraMotion
 from estimator.estimate import Estimator
 from estimator.image.feature import Feature
 from estimator.twist_history import TwistHistory
@@ -20,7 +20,7 @@ _SEEN = {
 }
 
 
-def rehearse(estimator: Estimator, controller: Controller, target: TargetKind) -> None:
+def rehearse(estimator: Estimator, controller: CameraMotion, target: TargetKind) -> None:
     """Let an estimator and a controller of a run's kind work on made-up images for a moment.
 
     Compiling their kernels takes seconds the first time and loading them a tenth of a second

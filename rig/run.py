@@ -7,10 +7,6 @@ from pathlib import Path
 
 from drivers.clock import Clock, WallClock, local_timestamp, time_of_day_offset_ns
 from drivers.errors import ConfigError
-from estimator.active.circle import CircularVelocity
-from estimator.active.controller import Controller
-from estimator.active.information_policy import InformationPolicy, Walls
-from estimator.active.policy import ConstantVelocity, PaperPolicy, VelocityPolicy
 from estimator.batch import BatchLeastSquares
 from estimator.estimate import Estimator
 from estimator.extended import ExtendedKalmanFilter
@@ -25,7 +21,7 @@ from estimator.triangulation import Triangulation
 from rig.analysis import Analysis, analyse
 from rig.background_view import BackgroundView
 from rig.build import Rig, build_rig, intrinsics_of, is_simulated
-from rig.config import MotionConfig, RigConfig, TargetKind
+from rig.config import RigConfig, TargetKind
 from rig.deadman import Deadman
 from rig.envelope import Envelope
 from rig.fusion import Fusion, FusionLog
@@ -34,6 +30,7 @@ from rig.log.header import LogHeader
 from rig.log.recorder import Recorded
 from rig.log.run_log import open_run_log
 from rig.loop import RunLoop
+from rig.motion import make_controller
 from rig.outcome import RunOutcome
 from rig.realtime import control_conditions
 from rig.recorded.setup import RunSetup, write_setup
@@ -42,6 +39,7 @@ from rig.rehearsal import rehearse
 from rig.rolling_shutter import RollingShutter
 from rig.run_data import RunData
 from rig.safety import Limiter
+from rig.servo import servo_figures, servo_task
 from rig.summary import summarise
 from rig.walls import walls_around
 
@@ -75,7 +73,7 @@ def execute(
     Raises ConnectError when a device cannot be opened; failures during the run are in
     ``outcome.error``.
     """
-    rehearse(make_observer(config, target), make_controller(config.motion), target)
+    rehearse(make_observer(config, target), make_controller(config), target)
     with (
         build_rig(config, target, realtime) as rig,
         open_run_log(run_dir, _header(rig, config, target, attachments), rig.clock) as log,
@@ -87,8 +85,8 @@ def execute(
         # What has to be compiled is compiled here, before time counts.
         fusion = make_fusion(config, target, data, log)
         controller = make_controller(
-            config.motion,
-            config.safety.min_target_distance_m,
+            config,
+            servo_task(config, rig.intrinsics),
             walls_around(config.safety, rig.T_tool_camera, lambda: fusion.state),
         )
         envelope = Envelope(config.safety, rig.T_tool_camera, rig.intrinsics)
@@ -174,6 +172,7 @@ def _result(
     radius_true_m = None if rig.truth is None else rig.truth.radius_m
     analysis = analyse(outcome.data, config, radius_true_m)
     summary = summarise(target, outcome, analysis, config, rig.renderer, wall_s, run_dir)
+    summary |= servo_figures(outcome.data, config, rig.intrinsics)
     return RunResult({**summary, **_of_log(recorded)}, outcome, analysis, rig.intrinsics)
 
 
@@ -219,22 +218,3 @@ def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: Fusio
         shutter = RollingShutter(given.row_time_s, lens)
     observer = make_observer(config, target)
     return Fusion(observer, data, log, max_extrapolation_s, given.latency_s, shutter)
-
-
-def make_controller(
-    motion: MotionConfig,
-    least_distance_m: float = 0.0,
-    walls: Callable[[], Walls | None] = lambda: None,
-) -> Controller:
-    """The camera motion that the configuration asks for; what bounds it, where it plans ahead."""
-    policy: VelocityPolicy
-    if motion.policy == "constant":
-        policy = ConstantVelocity(motion.velocity_m_s)
-    elif motion.policy == "circle":
-        policy = CircularVelocity(motion.velocity_m_s, motion.circle_radius_m)
-    elif motion.policy == "information":
-        most_m = motion.max_target_distance_m
-        policy = InformationPolicy(motion.velocity_m_s, least_distance_m, most_m, walls)
-    else:
-        policy = PaperPolicy(motion.velocity_m_s, motion.k1, motion.k2)
-    return Controller(policy, motion.centring_gain_per_s)

@@ -20,12 +20,14 @@ class Showing:
         data: RunData,
         stats: TickStats,
         convergence: Convergence,
+        servo: Callable[[Estimate], str],
     ) -> None:
         self._on_tick = on_tick
         self._fusion = fusion
         self._data = data
         self._stats = stats
         self._convergence = convergence
+        self._servo = servo
         self._estimate: Estimate | None = None
         self.started_s = 0.0
 
@@ -55,5 +57,6 @@ class Showing:
                 late_s=self._stats.late_s[-1] if self._stats.late_s else 0.0,
                 arm=self._fusion.state,
                 sighting=self._fusion.newest_sighting,
+                servo="" if self._estimate is None else self._servo(self._estimate),
             )
         )

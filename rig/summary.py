@@ -23,6 +23,8 @@ JSON_KEYS = (
     "radius_calibration_parts_m",
     "rms_vs_ideal",
     "time_to_1pct_s",
+    "servo_error_px",
+    "servo_distance_error_m",
     "radius_std_m",
     "nees",
     "frames",
@@ -73,6 +75,8 @@ def summarise(
         **limits_of(None),
         "rms_vs_ideal": analysis.rms_vs_ideal,
         "time_to_1pct_s": analysis.time_to_1pct_s,
+        "servo_error_px": None,
+        "servo_distance_error_m": None,
         "radius_std_m": None if radius_m is None else outcome.data.updates[-1].radius_std_m,
         "nees": None if radius_m is None else analysis.nees,
         "frames": outcome.data.frames,
@@ -126,6 +130,7 @@ def table(summary: Mapping[str, Json]) -> Table:
         ("position", where),
         *_progress(summary),
         ("time to stay within ± 1 %", _number(summary["time_to_1pct_s"], "{:.2f} s")),
+        *_servo(summary),
         (
             "frames",
             f"{summary['frames']} received, {summary['frames_lost']} without an outline, "
@@ -159,6 +164,14 @@ def _progress(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
             rms if summary["estimator"] == "observer" else f"{rms} (the paper's observer)",
         ),
     ]
+
+
+def _servo(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
+    """How far the target ended from its wanted place, where there was one."""
+    if summary["servo_error_px"] is None:
+        return []
+    off_m = _number(summary["servo_distance_error_m"], "{:+.2f} mm", 1e3)
+    return [("servo error", f"{_number(summary['servo_error_px'], '{:.2f} px')}, {off_m}")]
 
 
 def _log(summary: Mapping[str, Json]) -> str:

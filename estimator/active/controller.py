@@ -1,5 +1,7 @@
 """From what is known of the target to the twist the camera should have."""
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,22 @@ from estimator.active.policy import InformedPolicy, VelocityPolicy
 from estimator.estimate import Estimate
 
 FloatArray = NDArray[np.float64]
+
+
+class CameraMotion(Protocol):
+    """What moves the camera."""
+
+    def twist(self, estimate: Estimate, dt_s: float) -> FloatArray:
+        """The camera's twist (6,) (v, ω) for now; what it plans then moves on ``dt_s``."""
+        ...
+
+    def arrived(self, estimate: Estimate) -> bool:
+        """Whether the camera is where it has to get, if it has to get anywhere."""
+        ...
+
+    def status(self, estimate: Estimate) -> str:
+        """How far it is from there, or ""."""
+        ...
 
 
 class Controller:
@@ -41,3 +59,11 @@ class Controller:
             omega *= self._max_omega_rad_s / norm
         self._policy.advance(estimate.axis, omega, dt_s)
         return np.concatenate((v, omega))
+
+    def arrived(self, estimate: Estimate) -> bool:
+        """Always: there is no place to get to."""
+        return True
+
+    def status(self, estimate: Estimate) -> str:
+        """Nothing to tell."""
+        return ""

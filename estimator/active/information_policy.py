@@ -7,21 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimator.active.information import displacements, sphere_directions, variance_decrease
+from estimator.active.room import BRAKING_SHARE, BoolArray, Walls, room_for
 from estimator.estimate import Estimate
 
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-# Unit normals (k, 3) in the camera's axes and how far (k,) the camera may go along each, in m.
-Walls = tuple[FloatArray, FloatArray]
 
 _DIRECTIONS = 60
 _HORIZON_S = 0.5
 # Another direction has to leave less than this share of the variance that going on leaves.
 _WORTH_TURNING = 0.7
 _TURN_RAD_S = 3.0
-# Room kept beyond the horizon for braking, as a share of the way to it.
-_BRAKING_SHARE = 0.5
 
 
 class InformationPolicy:
@@ -96,18 +91,13 @@ class InformationPolicy:
 
     def _free(self, directions: FloatArray, way_m: float, estimate: Estimate) -> BoolArray:
         """Which of the directions (n, 3) leave room for the way and for braking."""
-        free: BoolArray = np.ones(len(directions), dtype=bool)
+        free = room_for(directions, way_m, self._walls())
         if estimate.chi > 0.0:
             target_m = estimate.s / estimate.chi
-            shifts = displacements(directions, way_m * (1.0 + _BRAKING_SHARE), estimate.axis)
+            shifts = displacements(directions, way_m * (1.0 + BRAKING_SHARE), estimate.axis)
             now_m = float(np.linalg.norm(target_m)) - 1.0 / estimate.chi
             then_m = np.linalg.norm(target_m - shifts, axis=1) - 1.0 / estimate.chi
             # Where the camera already is beyond a bound, the way back is free.
             free &= (then_m >= self._least_m) | (then_m > now_m)
             free &= (then_m <= self._most_m) | (then_m < now_m)
-        walls = self._walls()
-        if walls is not None:
-            normals, rooms_m = walls
-            closing_m = (1.0 + _BRAKING_SHARE) * way_m * directions @ normals.T
-            free &= ((closing_m <= rooms_m) | (closing_m <= 0.0)).all(axis=1)
         return free

@@ -10,7 +10,7 @@ from rig.config import TargetKind
 EstimatorKind = Literal[
     "observer", "kalman", "batch", "triangulation", "limb_plane", "limb_plane_ekf"
 ]
-PolicyKind = Literal["constant", "paper", "information", "circle"]
+PolicyKind = Literal["constant", "paper", "information", "circle", "servo"]
 NoiseKind = Literal["clean", "hard", "laggy", "lossy"]
 StartKind = Literal["default", "axial", "along", "near", "far"]
 

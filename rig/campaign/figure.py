@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from rig.campaign.worker import GRID_S, Row
 
-_LINES = {"constant": "-", "paper": "--", "information": "-.", "circle": ":"}
+_LINES = {"constant": "-", "paper": "--", "information": "-.", "circle": ":", "servo": (0, (1, 3))}
 _COLOURS = {
     "observer": "#1f5fa8",
     "kalman": "#c62828",

@@ -25,7 +25,7 @@ def compare(
         typer.Option(help="Of observer, kalman, batch, triangulation, limb_plane, limb_plane_ekf."),
     ] = "observer,kalman",
     policies: Annotated[
-        str, typer.Option(help="Of constant, paper, information, circle.")
+        str, typer.Option(help="Of constant, paper, information, circle, servo.")
     ] = "constant,paper,information",
     noise: Annotated[str, typer.Option(help="Of clean, hard, laggy, lossy.")] = "clean,hard",
     starts: Annotated[

@@ -54,6 +54,14 @@ def run(
             "file's run.until_share, none.",
         ),
     ] = None,
+    servo: Annotated[
+        bool,
+        typer.Option(
+            "--servo",
+            help="Bring the target to motion.servo's place in the image and distance, around it "
+            "meanwhile (motion.policy=servo); end when there.",
+        ),
+    ] = False,
     realtime: Annotated[
         bool,
         typer.Option(
@@ -100,6 +108,7 @@ def run(
     extra += [] if duration is None else [f"run.duration_s={duration!r}"]
     extra += [] if seed is None else [f"sim.seed={seed}"]
     extra += ["run.until_converged=true"] if until_converged else []
+    extra += ["motion.policy=servo"] if servo else []
     extra += [] if until is None else [f"run.until_share={_share(until)!r}"]
     loaded = load_config(target, rig, extra)
     config, source = calibrated(loaded, uncalibrated)
@@ -213,6 +222,7 @@ def _explain(result: "RunResult", transient: bool) -> None:
             f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
             "error is left; run longer, faster or with a larger estimator.alpha"
         )
+    _explain_servo(result)
     lost = result.summary["images_not_recorded"]
     if lost:
         warn(
@@ -220,6 +230,20 @@ def _explain(result: "RunResult", transient: bool) -> None:
         )
     if not outcome.at_rest:
         warn("warning: the arm was not seen at rest after its stop; check it before coming near")
+
+
+def _explain_servo(result: "RunResult") -> None:
+    """Say that a servo has not got where it should."""
+    from rig.outcome import Ending
+
+    off_px, off_m = (result.summary[f"servo_{key}"] for key in ("error_px", "distance_error_m"))
+    if isinstance(off_px, float) and result.outcome.ending is Ending.TIME:
+        distance = f"{1e3 * off_m:+.1f} mm" if isinstance(off_m, float) else "an unknown distance"
+        held = result.outcome.last_hold
+        warn(
+            f"not arrived: the target is {off_px:.1f} px and {distance} from its wanted place"
+            + (f"; the motion was held: {held}" if held else "; run longer, or see motion.servo")
+        )
 
 
 def _explain_interval(result: "RunResult") -> None:

@@ -19,9 +19,10 @@ from rig.fusion import Fusion
 from rig.log.header import LogHeader
 from rig.log.run_log import RunLog, open_run_log
 from rig.loop import RunLoop
+from rig.motion import make_controller
 from rig.outcome import LiveStatus, RunOutcome
 from rig.records import write_config
-from rig.run import make_controller, make_observer
+from rig.run import make_observer
 from rig.run_data import RunData
 from rig.safety import Limiter
 from rig.vision import Sighting
@@ -188,7 +189,7 @@ def make_bench(
         arm=arm,
         vision=vision,
         fusion=fusion,
-        controller=make_controller(config.motion),
+        controller=make_controller(config),
         limiter=Limiter(config.safety, Envelope(config.safety, np.eye(4), INTRINSICS)),
         config=config,
         data=data,

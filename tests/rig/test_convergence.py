@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rig.convergence import DEVIATIONS_95, interval_share
+from estimator.estimate import DEVIATIONS_95
 from tests.estimator.exact_motion import BALL, lively
 from tests.estimator.noisy_images import NoisyArm, estimates, guessed
 from tests.estimator.responses import MOTION, REGULAR
@@ -18,7 +18,7 @@ def test_the_truth_is_inside_the_stated_interval_in_95_of_100_runs() -> None:
     inside, stopped_s = [], []
     for seed in range(SEEDS):
         for estimate in estimates(guessed(BALL), stamps, exact, arm, 0.05, seed):
-            if interval_share(estimate) <= SHARE:
+            if estimate.interval_share <= SHARE:
                 break
         low_m, high_m = estimate.radius_interval_m(DEVIATIONS_95)
         assert low_m is not None and high_m is not None
