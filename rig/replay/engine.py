@@ -20,6 +20,7 @@ from rig.replay.settings import Source, check_answerable, geometry_of
 from rig.replay.story import Story
 from rig.run import make_fusion
 from rig.run_data import RunData
+from rig.servo import servo_figures
 from rig.summary import summarise
 from rig.vision import Sighting
 
@@ -86,6 +87,7 @@ def replay(
     summary = summarise(
         recording.target, outcome, analysis, config, recording.renderer, wall_s, run_dir
     )
+    summary |= servo_figures(data, config, intrinsics)
     return Replay(
         config=config,
         summary=summary,
