@@ -9,7 +9,6 @@ from typing import Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from drivers.clock import Clock, WallClock
 from drivers.errors import ConfigError
@@ -18,6 +17,7 @@ from estimator.image.intrinsics import Intrinsics
 from estimator.image.tracker import TargetTracker, warm_up
 from rig.config import RigConfig, TargetKind
 from rig.config_devices import ArmConfig, CameraConfig
+from rig.given_values import hand_eye_of, intrinsics_of
 from rig.image_size import SizedVision
 from rig.tcp_offset import check_tcp
 from rig.vision import Vision
@@ -232,27 +232,7 @@ def given_geometry(config: RigConfig, devices: Devices | None) -> tuple[Intrinsi
     if intrinsics is None or T_tool_camera is None:
         missing = "intrinsics" if intrinsics is None else "tool_camera_xyz_m and _rotvec_rad"
         raise ConfigError(
-            f"calibration.{missing} must be given: these devices do not know it themselves"
+            f"calibration.{missing} must be known, and these devices do not know it themselves: "
+            "run `rig calibrate` with the rig file"
         )
     return intrinsics, T_tool_camera
-
-
-def intrinsics_of(config: RigConfig) -> Intrinsics | None:
-    """The given calibration's intrinsics."""
-    given = config.calibration.intrinsics
-    if given is None:
-        return None
-    return Intrinsics(
-        given.fx_px, given.fy_px, given.cx_px, given.cy_px, np.array(given.distortion)
-    )
-
-
-def hand_eye_of(config: RigConfig) -> FloatArray | None:
-    """The given calibration's T_tool_camera (4, 4)."""
-    given = config.calibration
-    if given.tool_camera_xyz_m is None or given.tool_camera_rotvec_rad is None:
-        return None
-    T_tool_camera = np.eye(4)
-    T_tool_camera[:3, :3] = Rotation.from_rotvec(given.tool_camera_rotvec_rad).as_matrix()
-    T_tool_camera[:3, 3] = given.tool_camera_xyz_m
-    return T_tool_camera

@@ -1,94 +1,62 @@
-"""Which calibration a run uses: the file of `rig calibrate`, given values, or nominal ones."""
+"""Which calibration a run uses: the file of `rig calibrate`, measured values, or nominal ones."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import ConfigError
 from rig.build import is_simulated
 from rig.calibration.result import CalibrationFile, IntrinsicsResult, load_calibration
 from rig.calibration.result_check import check_usable
+from rig.calibration_place import calibration_path
 from rig.config import RigConfig
-from rig.config_calibration import CalibrationConfig, IntrinsicsConfig
+from rig.config_calibration import IntrinsicsConfig
 from rig.fingerprints import fingerprints
+from rig.start_values import replaced, with_nominal
 from rig.tcp_offset import tcp_of
-from sim_backend import drawings
 
 
-def calibration_path(config: RigConfig) -> Path:
-    """Where the rig's calibration is, or will be."""
-    return Path(config.calibration.file or f"calibration/{config.name}.yaml")
+class NotCalibratedError(ConfigError):
+    """A real rig of which nobody has measured what a run must know; nothing was opened."""
 
 
-def calibrated(config: RigConfig, uncalibrated: bool = False) -> tuple[RigConfig, str]:
-    """The configuration with the geometry to use, and where that is from, in words.
+@dataclass(frozen=True, slots=True)
+class Calibrated:
+    """A configuration with the geometry to use."""
 
-    The calibration's file goes before given values; without either the device's own factory
-    values hold. Raises ConfigError for a file that is named but missing, failed or out of date.
+    config: RigConfig
+    source: str  # where that geometry is from, in words
+    file: CalibrationFile | None = None  # where it is from `rig calibrate`
+    path: Path | None = None
+
+
+def calibrated(
+    config: RigConfig, rig_file: Path | None = None, uncalibrated: bool = False
+) -> Calibrated:
+    """The geometry to use for ``config``, which was read from ``rig_file``.
+
+    The calibration's file goes before given values; without either a simulated rig's factory
+    values hold. Raises NotCalibratedError for a real rig without a file whose rig file does not
+    say that its values were measured, ConfigError for a calibration that is named but missing,
+    failed or out of date.
     """
     if uncalibrated:
-        return with_nominal(config), "nominal values (--uncalibrated)"
-    found = calibration_in_use(config)
-    if found is None:
-        given = config.calibration.intrinsics is not None
-        return config, "given in the rig file" if given else "the device's own"
-    return _with_values(config, found), str(calibration_path(config))
-
-
-def calibration_in_use(config: RigConfig) -> CalibrationFile | None:
-    """The rig's calibration; None when there is none and the configuration asks for none.
-
-    Raises ConfigError for a file that is named but missing, failed or out of date.
-    """
-    path = calibration_path(config)
+        nominal = with_nominal(config)
+        if missing := _missing(nominal):
+            raise NotCalibratedError(
+                f"--uncalibrated takes the values under calibration.nominal, and {missing} there "
+                f"is not given. Better: {_command(rig_file)}"
+            )
+        return Calibrated(nominal, "nominal values (--uncalibrated)")
+    path = calibration_path(config, rig_file)
     if config.calibration.file is None and not path.exists():
-        return None
+        return Calibrated(config, _given(config, path, rig_file))
     found = load_calibration(path)
     if found.rig != config.name:
         raise ConfigError(f"{path} is the calibration of the rig {found.rig}, not {config.name}")
     # The board only matters for calibrating: another one in the configuration changes nothing.
     now = {key: value for key, value in fingerprints(config).items() if key != "board"}
     check_usable(found, now, path)
-    return found
-
-
-def with_nominal(config: RigConfig) -> RigConfig:
-    """The configuration with what is known without a calibration; simulated: its drawings.
-
-    Values that the rig file gives stay.
-    """
-    if not is_simulated(config):
-        return config
-    camera, given = config.sim.camera, config.calibration
-    values: dict[str, object] = {}
-    if given.intrinsics is None:
-        values["intrinsics"] = IntrinsicsConfig(
-            fx_px=drawings.FOCAL_PX,
-            fy_px=drawings.FOCAL_PX,
-            cx_px=0.5 * (camera.width - 1),
-            cy_px=0.5 * (camera.height - 1),
-        )
-    if given.tool_camera_xyz_m is None:
-        values["tool_camera_xyz_m"] = drawings.T_TOOL_CAMERA[:3]
-        values["tool_camera_rotvec_rad"] = drawings.T_TOOL_CAMERA[3:]
-    return _replaced(config, values)
-
-
-def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
-    """``config`` with the file's values; the check before has made sure that they are there."""
-    lens, hand_eye, latency = found.intrinsics, found.hand_eye, found.latency
-    assert lens is not None
-    assert hand_eye is not None
-    assert latency is not None
-    return _replaced(
-        config,
-        {
-            "intrinsics": intrinsics_config(lens),
-            "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
-            "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
-            "tcp_offset": tcp_of(hand_eye.depends_on),
-            "latency_s": latency.latency_s,
-            "row_time_s": latency.row_time_s,
-        },
-    )
+    return Calibrated(_with_values(config, found), str(path), found, path)
 
 
 def intrinsics_config(found: IntrinsicsResult) -> IntrinsicsConfig:
@@ -103,6 +71,52 @@ def intrinsics_config(found: IntrinsicsResult) -> IntrinsicsConfig:
     )
 
 
-def _replaced(config: RigConfig, values: dict[str, object]) -> RigConfig:
-    data = {**config.calibration.model_dump(), **values}
-    return config.model_copy(update={"calibration": CalibrationConfig.model_validate(data)})
+def _given(config: RigConfig, path: Path, rig_file: Path | None) -> str:
+    """Where the geometry is from without a calibration's file."""
+    given, where = config.calibration, rig_file or "the rig file"
+    if is_simulated(config):
+        return "the device's own" if given.intrinsics is None else "given in the rig file"
+    if _missing(config):
+        raise NotCalibratedError(
+            f"{config.name} is not calibrated: there is no {path}. Make it: {_command(rig_file)}"
+        )
+    if given.obtained is None:
+        raise NotCalibratedError(
+            f"{config.name} is not calibrated: there is no {path}, and {where} does not say how "
+            "its calibration.intrinsics and tool_camera_* were obtained. Guesses belong under "
+            f"calibration.nominal; then {_command(rig_file)}. Measured values need a word on how "
+            'and when: calibration.obtained: "…"'
+        )
+    return f"given in the rig file: {given.obtained}"
+
+
+def _missing(config: RigConfig) -> str:
+    """What no real rig can do without and ``config`` does not have; "" when all is there."""
+    given = config.calibration
+    if is_simulated(config) or None not in (given.intrinsics, given.tool_camera_xyz_m):
+        return ""
+    return "intrinsics" if given.intrinsics is None else "tool_camera_xyz_m and _rotvec_rad"
+
+
+def _command(rig_file: Path | None) -> str:
+    return "rig calibrate" + ("" if rig_file is None else f" --rig {rig_file}")
+
+
+def _with_values(config: RigConfig, found: CalibrationFile) -> RigConfig:
+    """``config`` with the file's values; the check before has made sure that they are there."""
+    lens, hand_eye, latency = found.intrinsics, found.hand_eye, found.latency
+    assert lens is not None
+    assert hand_eye is not None
+    assert latency is not None
+    return replaced(
+        config,
+        {
+            "obtained": f"rig calibrate, {found.made}",
+            "intrinsics": intrinsics_config(lens),
+            "tool_camera_xyz_m": hand_eye.tool_camera_xyz_m,
+            "tool_camera_rotvec_rad": hand_eye.tool_camera_rotvec_rad,
+            "tcp_offset": tcp_of(hand_eye.depends_on),
+            "latency_s": latency.latency_s,
+            "row_time_s": latency.row_time_s,
+        },
+    )

@@ -1,4 +1,4 @@
-"""The calibration section: nominal values, the board, how to calibrate, and where the result is."""
+"""The calibration section: what is known before, the board, how to calibrate, the result."""
 
 from typing import Annotated, Self
 
@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from rig.calibration.board import BoardConfig
 from rig.calibration.hand_eye import HandEyeSettings
-from rig.calibration.pose_candidates import PoseLimits
+from rig.calibration.pose_candidates import PoseLimits, StartDoubt
 from rig.calibration.result_check import Requirements
 from rig.config_section import Finite, Positive, Section
 
@@ -34,16 +34,42 @@ class PlanConfig(Section):
     speed: Annotated[float, Field(gt=0, le=1)] = 0.7  # share of the safety section's speeds
     limits: PoseLimits = PoseLimits()
     hand_eye: HandEyeSettings = HandEyeSettings()
+    doubt: StartDoubt = StartDoubt()  # how far the values to start from may be off
+
+
+def _check_whole(xyz_m: object, rotvec_rad: object) -> None:
+    if (xyz_m is None) != (rotvec_rad is None):
+        raise ValueError("tool_camera_xyz_m and tool_camera_rotvec_rad go together: give both")
+
+
+class NominalConfig(Section):
+    """What `rig calibrate` starts from, and `rig run --uncalibrated` uses; nothing else does.
+
+    A rough place on the tool is enough: 2 cm, 10°. Without intrinsics a common lens is assumed.
+    """
+
+    intrinsics: IntrinsicsConfig | None = None
+    tool_camera_xyz_m: tuple[Finite, Finite, Finite] | None = None
+    tool_camera_rotvec_rad: tuple[Finite, Finite, Finite] | None = None
+    latency_s: Finite | None = None
+
+    @model_validator(mode="after")
+    def _hand_eye_whole(self) -> Self:
+        _check_whole(self.tool_camera_xyz_m, self.tool_camera_rotvec_rad)
+        return self
 
 
 class CalibrationConfig(Section):
-    """What is known about the rig's geometry; left out, the device's own factory values hold.
+    """What is known about the rig's geometry; left out, a simulated rig's factory values hold.
 
-    With ``file`` (relative to the working directory) a run needs the result of `rig calibrate`
-    and takes everything from there; the values here are then only what calibrating starts from.
+    ``intrinsics`` to ``latency_s`` are for values that were measured elsewhere: a run trusts
+    them, of a real rig only if ``obtained`` says how. With a calibration's file a run takes all
+    of them from there; with ``file`` (relative to the rig file) it needs one.
     """
 
     file: str | None = None
+    nominal: NominalConfig = NominalConfig()
+    obtained: Annotated[str, Field(min_length=1)] | None = None
     intrinsics: IntrinsicsConfig | None = None
     tool_camera_xyz_m: tuple[Finite, Finite, Finite] | None = None
     tool_camera_rotvec_rad: tuple[Finite, Finite, Finite] | None = None
@@ -58,8 +84,7 @@ class CalibrationConfig(Section):
 
     @model_validator(mode="after")
     def _what_goes_together(self) -> Self:
-        if (self.tool_camera_xyz_m is None) != (self.tool_camera_rotvec_rad is None):
-            raise ValueError("tool_camera_xyz_m and tool_camera_rotvec_rad go together: give both")
+        _check_whole(self.tool_camera_xyz_m, self.tool_camera_rotvec_rad)
         if self.row_time_s != 0.0 and self.intrinsics is None and self.file is None:
             raise ValueError("row_time_s goes with intrinsics: give both")
         return self

@@ -20,11 +20,12 @@ from estimator.observer import Observer
 from estimator.triangulation import Triangulation
 from rig.analysis import Analysis, analyse
 from rig.background_view import BackgroundView
-from rig.build import Rig, build_rig, intrinsics_of, is_simulated
+from rig.build import Rig, build_rig, is_simulated
 from rig.config import RigConfig, TargetKind
 from rig.deadman import Deadman
 from rig.envelope import Envelope
 from rig.fusion import Fusion, FusionLog
+from rig.given_values import intrinsics_of
 from rig.live import View
 from rig.log.header import LogHeader
 from rig.log.recorder import Recorded

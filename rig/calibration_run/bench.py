@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock, WallClock
+from drivers.errors import DeviceTimeoutError
 from drivers.interfaces import Arm, Camera
 from estimator.image.intrinsics import Intrinsics
 from rig.build import (
@@ -21,9 +22,13 @@ from rig.build import (
 )
 from rig.config import RigConfig
 from rig.deadman import Deadman
+from rig.given_values import hand_eye_of, intrinsics_of
 from rig.image_size import SizedCamera
+from rig.start_values import ASSUMED, start_intrinsics, start_place
 
 FloatArray = NDArray[np.float64]
+
+_FIRST_FRAME_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,7 @@ class Bench:
     T_tool_camera: FloatArray  # (4, 4)
     deadman: Deadman | None  # on the wall clock
     moves: bool = True  # whether the arm takes commands; else somebody moves it by hand
+    assumed: str = ""  # in words, what of the values to start from is a guess
 
     def __enter__(self) -> Self:
         return self
@@ -67,17 +73,30 @@ def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Benc
         deadman = _deadman(config, devices.clock, devices.arm) if realtime else None
         camera = _sized(devices.camera, config)
         return Bench(camera, devices.arm, devices.clock, intrinsics, T_tool_camera, deadman)
-    intrinsics, T_tool_camera = given_geometry(config, None)
+    # Before anything is opened; by hand, no motion is planned with it.
+    unknown = by_hand and hand_eye_of(config) is None
+    T_tool_camera = np.eye(4) if unknown else start_place(config)
     clock = WallClock()
-    camera = _sized(open_camera(config.camera, clock), config)
-    try:
+    with ExitStack() as opened:
+        camera = _sized(open_camera(config.camera, clock), config)
+        opened.callback(camera.close)
+        intrinsics = start_intrinsics(config, *_image_size(camera))
         listener = open_listener(config.arm, clock) if by_hand else None
         arm = open_arm(config.arm, clock) if listener is None else listener
-    except BaseException:
-        camera.close()
-        raise
+        opened.pop_all()
     deadman = _deadman(config, clock, arm) if listener is None else None
-    return Bench(camera, arm, clock, intrinsics, T_tool_camera, deadman, listener is None)
+    assumed = ASSUMED if intrinsics_of(config) is None else ""
+    return Bench(camera, arm, clock, intrinsics, T_tool_camera, deadman, listener is None, assumed)
+
+
+def _image_size(camera: Camera) -> tuple[int, int]:
+    """Width and height as a first look shows them; raises DeviceTimeoutError without one."""
+    frame = camera.read(_FIRST_FRAME_S)
+    if frame is None:
+        raise DeviceTimeoutError(
+            f"no picture within {_FIRST_FRAME_S:g} s: check the camera and its connection"
+        )
+    return frame.image.shape[1], frame.image.shape[0]
 
 
 def _sized(camera: Camera, config: RigConfig) -> Camera:

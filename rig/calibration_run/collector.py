@@ -41,7 +41,7 @@ class Collector:
 
     ``nominal`` holds the values to start with; its board pose is replaced by what the first
     look shows. ``keep`` is called with every still as it is taken. Fewer than ``needed`` stills
-    are good for nothing.
+    are good for nothing. ``doubt`` is how far ``nominal`` may be off.
     """
 
     def __init__(
@@ -55,6 +55,7 @@ class Collector:
         keep: Callable[[Still], None],
         report: Callable[[PoseReport], None],
         needed: int,
+        doubt: StartDoubt,
         seed: int = 1,
     ) -> None:
         self._mover = mover
@@ -66,6 +67,7 @@ class Collector:
         self._keep = keep
         self._report = report
         self._needed = needed
+        self._doubt = doubt
         self._seed = seed
         self.skipped: list[str] = []
 
@@ -124,7 +126,7 @@ class Collector:
             Scene(self._state, self._points_m, size, taken[0].view.T_base_tool),
             max(count - len(taken), 1),
             self._limits,
-            doubt,
+            doubt or self._doubt,
             [still.view.T_base_tool for still in taken],
             self._mover.routes(),
             seed=self._seed + round_number,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from drivers.errors import ConfigError
 from drivers.interfaces import ArmState
-from rig.build import given_geometry, is_simulated
+from rig.build import is_simulated
 from rig.calibration import se3
 from rig.calibration.board import corner_points
 from rig.calibration.board_pose import board_pose
@@ -22,6 +22,8 @@ from rig.calibration_run.reach import Reach
 from rig.calibration_run.routes import Routes
 from rig.calibration_run.store import Store
 from rig.config import RigConfig
+from rig.given_values import intrinsics_of
+from rig.start_values import start_doubt, start_intrinsics, start_place
 from sim_backend.lens import lens_of
 from sim_backend.scene import build_scene
 from sim_backend.start import start_pose
@@ -45,8 +47,8 @@ class Foresight:
 
 def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]) -> Foresight:
     """Plan as ``rig calibrate`` would; raises ConfigError and CalibrationError as it does."""
-    intrinsics, T_tool_camera = given_geometry(config, None)
     plan, size = config.calibration.plan, image_size(config)
+    T_tool_camera, intrinsics = start_place(config), start_intrinsics(config, *size)
     T_base_tool, T_camera_board, assumed = _first_look(
         config, T_tool_camera, store_folder, conditions
     )
@@ -54,10 +56,11 @@ def plan_ahead(config: RigConfig, store_folder: Path, conditions: dict[str, str]
     state = State(T_tool_camera, board, to_vector(intrinsics))
     scene = Scene(state, corner_points(config.calibration.board), size, T_base_tool)
     limits = within_safety(plan.limits, config.safety)
+    doubt = start_doubt(plan.doubt, intrinsics_of(config) is None)
     joints, whose = joints_ahead(config, T_base_tool)
     here = ArmState(0.0, T_base_tool, np.zeros(6))
     reach = Routes(Reach(config.safety, here, joints, T_tool_camera), [T_base_tool])
-    first = plan_poses(scene, min(FIRST, plan.poses) - 1, limits, None, [T_base_tool], reach)
+    first = plan_poses(scene, min(FIRST, plan.poses) - 1, limits, doubt, [T_base_tool], reach)
     taken = [T_base_tool, *(pose.T_base_tool for pose in first)]
     count = plan.poses - len(taken)
     later = plan_poses(scene, count, limits, REFINED, taken, reach) if count > 0 else []
@@ -93,7 +96,7 @@ def _first_look(
             stills = []  # of another rig, or none: the simulated scene is as good
         if stills:
             view = stills[0].view
-            seen = board_pose(view.board, given_geometry(config, None)[0])
+            seen = board_pose(view.board, start_intrinsics(config, *image_size(config)))
             return view.T_base_tool, seen, f"as last time (the first still in {folder})"
     scene, start = build_scene(config.sim, "board"), config.sim.board.start
     camera = start_pose(scene.target, start, lens_of(config.sim.camera))

@@ -37,6 +37,7 @@ from rig.calibration_run.stills import Photographer
 from rig.calibration_run.store import Store
 from rig.calibration_run.watching import Progress, Stop
 from rig.config import RigConfig
+from rig.start_values import start_doubt
 
 _VERIFY_SEED = 1000  # other poses than those the fit has seen
 
@@ -92,6 +93,7 @@ class Session:
             store.add_still,
             progress.pose,
             self._plan.hand_eye.min_poses,
+            start_doubt(self._plan.doubt, bool(bench.assumed)),
         )
         self.file = before or CalibrationFile(
             rig=config.name, made=local_timestamp(), board=self._board

@@ -202,15 +202,16 @@ def _limits(rig: Path | None, max_state_age_s: float) -> "SafetyConfig":
 def _camera_on_tool(rig: Path) -> "FloatArray | None":
     """T_tool_camera (4, 4), as far as it is known."""
     from drivers.errors import ConfigError
-    from rig.build import hand_eye_of
     from rig.calibrated import calibrated
     from rig.config_load import load_config
+    from rig.given_values import hand_eye_of
+    from rig.start_values import with_nominal
 
     config = load_config("sphere", rig)
     # What is out of date, or was given to begin with, keeps off the table better than nothing.
     with suppress(ConfigError):
-        config, _ = calibrated(config)
-    return hand_eye_of(config)
+        return hand_eye_of(calibrated(config, rig).config)
+    return hand_eye_of(with_nominal(config))
 
 
 def _numbers(text: str) -> Any:

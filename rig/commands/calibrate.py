@@ -11,6 +11,7 @@ from rich.console import Console
 
 from rig.commands.calibrate_report import write_report_of
 from rig.commands.calibrate_request import (
+    ON_EARLIER_DATA,
     DryRun,
     FromImages,
     Manual,
@@ -20,7 +21,7 @@ from rig.commands.calibrate_request import (
     RollingShutter,
     Step,
     earlier,
-    with_pictures,
+    with_earlier,
 )
 from rig.commands.options import AsJson, Assignments, RigFile, Seed, warn
 from rig.exit_codes import ExitCode
@@ -42,7 +43,6 @@ _STEPS: dict[Step, str] = {
     "latency": "Wiggle in front of the board, on what the hand-eye step collected.",
     "verify": "Check the calibration with small motions and fresh poses.",
 }
-_ON_EARLIER_DATA = ("latency", "verify")
 
 
 @calibrate_app.callback()
@@ -148,7 +148,7 @@ def _run(step: Step, request: Request) -> None:
 def _on_the_rig(step: Step, request: Request) -> None:
     from drivers.clock import WallClock
     from rig.build import is_simulated
-    from rig.calibrated import calibration_path, with_nominal
+    from rig.calibration_place import calibration_path
     from rig.calibration_run.bench import open_bench
     from rig.calibration_run.hand_view import HandView
     from rig.calibration_run.keys import Keys
@@ -158,15 +158,16 @@ def _on_the_rig(step: Step, request: Request) -> None:
     from rig.calibration_run.store import Store
     from rig.calibration_run.summary import json_of, table
     from rig.fingerprints import fingerprints
+    from rig.start_values import with_nominal
     from rig.stop_request import StopRequest
     from rig.tcp_offset import tcp_fingerprint
 
     config = request.config()
-    path, depends_on = calibration_path(config), fingerprints(config)
+    path, depends_on = calibration_path(config, request.rig), fingerprints(config)
     before = earlier(step, path, depends_on)
-    config = with_nominal(with_pictures(config, before))
+    config = with_nominal(with_earlier(config, step, before))
     console = Console(stderr=True)
-    resume = request.resume or step in _ON_EARLIER_DATA
+    resume = request.resume or step in ON_EARLIER_DATA
     store = Store(path.with_name(f"{config.name}-data"), depends_on, resume)
     wall = WallClock()
     start_s = wall.now_s()
@@ -183,6 +184,8 @@ def _on_the_rig(step: Step, request: Request) -> None:
     ):
         depends_on |= tcp_fingerprint(bench.arm)
         store.also_under(depends_on)
+        if bench.assumed:
+            warn(bench.assumed)
         shown = ConsoleProgress(console)
         progress = RecordedProgress(shown, log, bench)
         watched = recorded(bench, log)

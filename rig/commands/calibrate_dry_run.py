@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.commands.calibrate_request import Request, Step, earlier, with_pictures
+from rig.commands.calibrate_request import Request, Step, earlier, with_earlier
 from rig.commands.options import warn
 
 if TYPE_CHECKING:
@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 
 def dry_run(step: Step, request: Request) -> None:
     """Plan and draw; opens nothing."""
-    from rig.calibrated import calibration_path, with_nominal
+    from rig.calibration_place import calibration_path
     from rig.calibration_run.plan_ahead import plan_ahead
     from rig.calibration_run.plan_picture import draw_plan
     from rig.fingerprints import fingerprints
+    from rig.start_values import with_nominal
 
     config = request.config()
-    path, now = calibration_path(config), fingerprints(config)
-    config = with_nominal(with_pictures(config, earlier(step, path, now)))
+    path, now = calibration_path(config, request.rig), fingerprints(config)
+    config = with_nominal(with_earlier(config, step, earlier(step, path, now)))
     foresight = plan_ahead(config, path.with_name(f"{config.name}-data"), now)
     picture = path.with_name(f"{config.name}-plan.png")
     title = f"planned calibration of {config.name}: nothing has moved"

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 def calibrate_from_images(folder: Path, request: Request) -> None:
     """Fit, save as the calibration's intrinsics, and say what is still missing."""
     from drivers.clock import WallClock, local_timestamp
-    from rig.calibrated import calibration_path
     from rig.calibration.detection import BoardDetector
     from rig.calibration.result import CalibrationFile, load_calibration, save_calibration
     from rig.calibration.result_check import judge
     from rig.calibration.result_make import intrinsics_result
+    from rig.calibration_place import calibration_path
     from rig.calibration_run.from_images import fit_folder
     from rig.calibration_run.progress import ConsoleProgress
     from rig.calibration_run.summary import json_of, table
@@ -30,7 +30,7 @@ def calibrate_from_images(folder: Path, request: Request) -> None:
     from rig.stop_request import StopRequest
 
     config, wall = request.config(), WallClock()
-    path, board = calibration_path(config), config.calibration.board
+    path, board = calibration_path(config, request.rig), config.calibration.board
     before = load_calibration(path) if path.exists() else None
     console, start_s = Console(stderr=True), wall.now_s()
     with StopRequest("stopping …") as stop, ConsoleProgress(console) as progress:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rig.config import RigConfig
 
 Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
+ON_EARLIER_DATA = ("latency", "verify")
 Realtime = Annotated[
     bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
 ]
@@ -95,7 +96,7 @@ class Request:
         ]
         if len(modes) > 1:
             raise ConfigError(f"{' and '.join(modes)} do not go together: choose one")
-        if modes and step in ("latency", "verify"):
+        if modes and step in ON_EARLIER_DATA:
             raise ConfigError(f"{modes[0]} does not go with `rig calibrate {step}`")
         if self.from_images is not None and step == "hand-eye":
             raise ConfigError(
@@ -137,12 +138,23 @@ def earlier(step: Step, path: Path, now: "Fingerprints") -> "CalibrationFile | N
     return found.model_copy(update=left)
 
 
-def with_pictures(config: "RigConfig", before: "CalibrationFile | None") -> "RigConfig":
-    """``config`` that starts from intrinsics found from pictures, where there are none given."""
+def with_earlier(config: "RigConfig", step: Step, before: "CalibrationFile | None") -> "RigConfig":
+    """``config`` that starts from what was found before, where that is better than nominal values.
+
+    Intrinsics from pictures are, unless the rig file gives measured ones; steps that go on with
+    earlier data take all that came of these.
+    """
     from rig.calibrated import intrinsics_config
 
-    lens = None if before is None else before.intrinsics
-    if lens is None or not lens.from_images or config.calibration.intrinsics is not None:
+    if before is None:
         return config
-    section = config.calibration.model_copy(update={"intrinsics": intrinsics_config(lens)})
+    given, lens, hand_eye = config.calibration, before.intrinsics, before.hand_eye
+    goes_on = step in ON_EARLIER_DATA
+    found: dict[str, object] = {}
+    if lens is not None and (goes_on or (lens.from_images and given.intrinsics is None)):
+        found["intrinsics"] = intrinsics_config(lens)
+    if hand_eye is not None and goes_on:
+        found["tool_camera_xyz_m"] = hand_eye.tool_camera_xyz_m
+        found["tool_camera_rotvec_rad"] = hand_eye.tool_camera_rotvec_rad
+    section = given.model_copy(update={"nominal": given.nominal.model_copy(update=found)})
     return config.model_copy(update={"calibration": section})

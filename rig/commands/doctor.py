@@ -63,7 +63,8 @@ def doctor(
     from rig.doctor.subject import Subject
     from rig.stop_request import StopRequest
 
-    subject = Subject(load_config("sphere", rig, assignments), out.absolute(), quick)
+    config = load_config("sphere", rig, assignments)
+    subject = Subject(config, out.absolute(), quick, rig_file=rig)
     with StopRequest("stopping …") as stop_requested:
         findings = _examine(subject, stop_requested)
         interrupted = stop_requested()

@@ -93,7 +93,7 @@ def run(
 ) -> None:
     """Move the camera, estimate the target's radius and pose, write a run directory."""
     from drivers.errors import ConfigError
-    from rig.calibrated import calibrated, calibration_in_use, calibration_path
+    from rig.calibrated import calibrated
     from rig.config_load import load_config
     from rig.page.address import page_address
     from rig.page.watching import watching
@@ -110,10 +110,9 @@ def run(
     extra += ["run.until_converged=true"] if until_converged else []
     extra += ["motion.policy=servo"] if servo else []
     extra += [] if until is None else [f"run.until_share={_share(until)!r}"]
-    loaded = load_config(target, rig, extra)
-    config, source = calibrated(loaded, uncalibrated)
-    calibration = None if uncalibrated else calibration_in_use(loaded)
-    warn(f"calibration: {source}")
+    geometry = calibrated(load_config(target, rig, extra), rig, uncalibrated)
+    config = geometry.config
+    warn(f"calibration: {geometry.source}")
     warn(f"estimator: {_estimator(config)}")
     address = page_address(view_host, view_port, view_token) if view else None
     run_dir = make_run_dir(out, target)
@@ -124,12 +123,12 @@ def run(
         with StopRequest() as stop_requested:
             shown, stopped = page.beside(view_for(console)), page.or_else(stop_requested)
             result = execute(
-                *(config, target, run_dir, realtime, shown, stopped, source),
-                attachments=tuple(p for p in [calibration_path(config)] if str(p) == source),
+                *(config, target, run_dir, realtime, shown, stopped, geometry.source),
+                attachments=() if geometry.path is None else (geometry.path,),
             )
         # First of all: what was measured is not to be lost to whatever goes wrong from here on.
         _write(run_dir, result.summary)
-        limits = _limits(result, config, calibration)
+        limits = _limits(result, config, geometry.file)
         if limits:
             result.summary.update(limits)
             _write(run_dir, result.summary)

@@ -23,20 +23,16 @@ _KEPT = (  # of the camera's report
 
 def calibration(subject: Subject, clock: Clock) -> Finding:
     """Whether there is what a real rig has to know about its geometry, and where it is from."""
-    from rig.calibrated import calibrated
+    from rig.calibrated import NotCalibratedError, calibrated
 
-    again = "rig calibrate --rig FILE"
+    again = f"rig calibrate --rig {subject.rig_file or 'FILE'}"
     try:
-        config, source = calibrated(subject.config)
+        source = calibrated(subject.config, subject.rig_file).source
+    except NotCalibratedError as error:
+        advice = f"{again}; looking and jogging work without, `rig run` refuses until then"
+        return Finding("calibration", Status.WARN, str(error), advice, {"source": None})
     except RigError as error:
         return Finding("calibration", Status.FAIL, str(error), again)
-    given = config.calibration
-    missing = [] if given.intrinsics is not None else ["the camera's intrinsics"]
-    missing += [] if given.tool_camera_xyz_m is not None else ["its place on the tool"]
-    if missing:
-        text = f"not known: {' and '.join(missing)}"
-        advice = f"{again}; looking and jogging work without, `rig run` refuses until then"
-        return Finding("calibration", Status.WARN, text, advice, {"source": None})
     return Finding("calibration", Status.OK, source, "", {"source": source})
 
 

@@ -15,6 +15,7 @@ class Subject:
     runs: Path  # where runs will be written; need not exist
     quick: bool = False  # shorter measurements
     root: Path = Path("/")  # of /proc, /sys, /dev and /etc
+    rig_file: Path | None = None  # which ``config`` was read from
 
     @property
     def hardware(self) -> bool:
@@ -28,6 +29,7 @@ class Subject:
             "runs": str(self.runs),
             "quick": self.quick,
             "root": str(self.root),
+            "rig_file": None if self.rig_file is None else str(self.rig_file),
         }
 
 
@@ -38,4 +40,5 @@ def subject_of(data: dict[str, Any]) -> Subject:
         runs=Path(data["runs"]),
         quick=bool(data["quick"]),
         root=Path(data["root"]),
+        rig_file=None if data["rig_file"] is None else Path(data["rig_file"]),
     )

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from drivers.errors import ConfigError
 from estimator.image.intrinsics import Intrinsics
-from rig.build import hand_eye_of, intrinsics_of
 from rig.config import RigConfig
+from rig.given_values import hand_eye_of, intrinsics_of
 from rig.replay.recording import Recording
 
 FloatArray = NDArray[np.float64]

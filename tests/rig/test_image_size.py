@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.calibrated import calibration_path
 from rig.calibration.result import save_calibration
+from rig.calibration_place import calibration_path
 from rig.config_load import load_config
 from rig.log.lines import lines
 from rig.log.reader import open_log

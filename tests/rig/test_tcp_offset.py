@@ -10,8 +10,12 @@ from drivers.clock import Clock
 from drivers.errors import ConfigError
 from drivers.interfaces import Arm
 from rig.build import build_rig
-from rig.calibrated import calibrated, calibration_path
+from rig.calibrated import calibrated
 from rig.calibration.result import load_calibration, save_calibration
+from rig.calibration.views import BoardView, PosedView
+from rig.calibration_place import calibration_path
+from rig.calibration_run.stills import Still
+from rig.calibration_run.store import Store
 from rig.config_load import load_config
 from rig.tcp_offset import check_tcp, tcp_fingerprint, tcp_of
 from sim_backend.arm import SimulatedArm
@@ -20,6 +24,12 @@ from tests.rig.calibration_run.small_rig import calibrate
 from tests.rig.fakes import KinematicArm
 from tests.rig.made_calibration import calibration_of
 
+STILL = Still(
+    PosedView(BoardView(np.arange(1), np.zeros((1, 3)), np.zeros((1, 2))), np.eye(4)),
+    np.zeros((48, 64), np.uint8),
+    0.0,
+    0.0,
+)
 TCP = (0.0, 0.0, 0.12, 0.0, -0.3, 0.001)
 
 
@@ -66,7 +76,7 @@ def with_file(tcp: str) -> None:
 
 def test_a_run_with_another_tcp_closes_the_arm_again(monkeypatch: pytest.MonkeyPatch) -> None:
     with_file("0 0 0.12 0 0 0")
-    config = calibrated(load_config("sphere"))[0]
+    config = calibrated(load_config("sphere")).config
     arms: list[KinematicArm] = []
 
     def open_arm(settings: object, clock: Clock) -> Arm:
@@ -99,6 +109,20 @@ def test_a_run_with_another_tcp_closes_the_arm_again(monkeypatch: pytest.MonkeyP
     assert not arms[0].commands
 
 
+def test_data_of_another_tcp_are_not_gone_on_with(here: Path) -> None:
+    folder = here / "data"
+    first = Store(folder, {"camera": "c"}, resume=False)
+    first.also_under(tcp_fingerprint(arm_with(TCP)))
+    first.add_still(STILL)
+    again = Store(folder, {"camera": "c"}, resume=True)
+    again.also_under(tcp_fingerprint(arm_with(TCP)))
+    assert len(again.stills) == 1
+    other = Store(folder, {"camera": "c"}, resume=True)
+    with pytest.raises(ConfigError, match="cannot resume: tcp changed"):
+        other.also_under(tcp_fingerprint(arm_with((0.0,) * 6)))
+
+
+@pytest.mark.slow
 def test_calibrating_notes_the_tcp_and_does_not_mix_data_of_two(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -144,17 +144,19 @@ def test_an_arms_address_is_the_configured_one():
 def test_a_missing_calibration_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # its file is looked for here
     arm = {"driver": "ur", "host": "192.0.2.1"}
-    missing = calibration(Subject(rig_config(arm=arm), tmp_path), WallClock())
+    real = {"arm": arm, "camera": {"driver": "opencv", "source": "/dev/video7"}}
+    missing = calibration(Subject(rig_config(**real), tmp_path), WallClock())
     advised(missing, Status.WARN)
-    assert "intrinsics" in missing.measured and "place on the tool" in missing.measured
+    assert "not calibrated" in missing.measured and "rig calibrate --rig" in missing.advice
     given = {
+        "obtained": "on an optical bench",
         "intrinsics": {"fx_px": 800, "fy_px": 800, "cx_px": 320, "cy_px": 240},
         "tool_camera_xyz_m": [0, 0, 0],
         "tool_camera_rotvec_rad": [0, 0, 0],
     }
-    whole = calibration(Subject(rig_config(arm=arm, calibration=given), tmp_path), WallClock())
+    whole = calibration(Subject(rig_config(**real, calibration=given), tmp_path), WallClock())
     advised(whole, Status.OK)
-    gone = rig_config(arm=arm, calibration={"file": "no/such.yaml"})
+    gone = rig_config(**real, calibration={"file": "no/such.yaml"})
     advised(calibration(Subject(gone, tmp_path), WallClock()), Status.FAIL)
 
 
