@@ -20,11 +20,13 @@ from rig.build import (
     open_listener,
     open_simulated,
 )
+from rig.calibration.result import Fingerprints
 from rig.config import RigConfig
 from rig.deadman import Deadman
 from rig.given_values import hand_eye_of, intrinsics_of
 from rig.image_size import SizedCamera
 from rig.start_values import ASSUMED, start_intrinsics, start_place
+from rig.tcp_offset import tcp_fingerprint
 
 FloatArray = NDArray[np.float64]
 
@@ -42,7 +44,13 @@ class Bench:
     T_tool_camera: FloatArray  # (4, 4)
     deadman: Deadman | None  # on the wall clock
     moves: bool = True  # whether the arm takes commands; else somebody moves it by hand
+    size_px: tuple[int, int] | None = None  # of the images, where the configuration leaves it open
     assumed: str = ""  # in words, what of the values to start from is a guess
+
+    def conditions(self) -> Fingerprints:
+        """What the open devices tell of the conditions that pictures are taken under."""
+        size = {} if self.size_px is None else {"image size": "x".join(map(str, self.size_px))}
+        return tcp_fingerprint(self.arm) | size
 
     def __enter__(self) -> Self:
         return self
@@ -80,13 +88,19 @@ def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Benc
     with ExitStack() as opened:
         camera = _sized(open_camera(config.camera, clock), config)
         opened.callback(camera.close)
-        intrinsics = start_intrinsics(config, *_image_size(camera))
+        size_px = _image_size(camera)
+        intrinsics = start_intrinsics(config, *size_px)
         listener = open_listener(config.arm, clock) if by_hand else None
         arm = open_arm(config.arm, clock) if listener is None else listener
         opened.pop_all()
     deadman = _deadman(config, clock, arm) if listener is None else None
     assumed = ASSUMED if intrinsics_of(config) is None else ""
-    return Bench(camera, arm, clock, intrinsics, T_tool_camera, deadman, listener is None, assumed)
+    return Bench(
+        *(camera, arm, clock, intrinsics, T_tool_camera, deadman),
+        moves=listener is None,
+        size_px=size_px,
+        assumed=assumed,
+    )
 
 
 def _image_size(camera: Camera) -> tuple[int, int]:

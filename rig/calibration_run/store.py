@@ -120,7 +120,10 @@ class Store:
     def _load(self) -> None:
         path = self.directory / _CONDITIONS
         if not path.exists():
-            raise ConfigError(f"{self.directory} holds nothing to resume: leave --resume out")
+            raise ConfigError(
+                f"{self.directory} holds nothing to resume: begin with `rig calibrate`, without "
+                "--resume"
+            )
         with self._readable():
             before = dict(json.loads(path.read_text(encoding="utf-8")))
         self._resumed = before
@@ -133,9 +136,10 @@ class Store:
     def _check_same(self, before: Mapping[str, str]) -> None:
         changed = [key for key, now in self._conditions.items() if before.get(key) != now]
         if changed:
+            self.stills, self.recording = [], None  # of no use now, though still on disk
             raise ConfigError(
                 f"cannot resume: {', '.join(changed)} changed since the data in "
-                f"{self.directory} were taken; leave --resume out to start anew"
+                f"{self.directory} were taken; start anew: `rig calibrate` without --resume"
             )
 
     @contextmanager

@@ -183,7 +183,7 @@ def _on_the_rig(step: Step, request: Request) -> None:
         open_calibration_log(log_path, config, bench, realtime) as log,
     ):
         depends_on |= tcp_fingerprint(bench.arm)
-        store.also_under(depends_on)
+        store.also_under(bench.conditions())
         if bench.assumed:
             warn(bench.assumed)
         shown = ConsoleProgress(console)
