@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.errors import ConfigError
 from rig.build import is_simulated
+from rig.calibration.errors import UnusableCalibrationError
 from rig.calibration.result import CalibrationFile, IntrinsicsResult, load_calibration
 from rig.calibration.result_check import check_usable
 from rig.calibration_place import calibration_path
@@ -15,7 +15,7 @@ from rig.start_values import replaced, with_nominal
 from rig.tcp_offset import tcp_of
 
 
-class NotCalibratedError(ConfigError):
+class NotCalibratedError(UnusableCalibrationError):
     """A real rig of which nobody has measured what a run must know; nothing was opened."""
 
 
@@ -36,8 +36,8 @@ def calibrated(
 
     The calibration's file goes before given values; without either a simulated rig's factory
     values hold. Raises NotCalibratedError for a real rig without a file whose rig file does not
-    say that its values were measured, ConfigError for a calibration that is named but missing,
-    failed or out of date.
+    say that its values were measured, UnusableCalibrationError for a calibration that is named but
+    missing, failed or out of date.
     """
     if uncalibrated:
         nominal = with_nominal(config)
@@ -52,7 +52,9 @@ def calibrated(
         return Calibrated(config, _given(config, path, rig_file))
     found = load_calibration(path)
     if found.rig != config.name:
-        raise ConfigError(f"{path} is the calibration of the rig {found.rig}, not {config.name}")
+        raise UnusableCalibrationError(
+            f"{path} is the calibration of the rig {found.rig}, not {config.name}"
+        )
     # The board only matters for calibrating: another one in the configuration changes nothing.
     now = {key: value for key, value in fingerprints(config).items() if key != "board"}
     check_usable(found, now, path)

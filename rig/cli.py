@@ -19,7 +19,7 @@ from rig.commands.reproduce import reproduce
 from rig.commands.run import run
 from rig.commands.sim import sim_app
 from rig.commands.view import view
-from rig.exit_codes import HELP, ExitCode, exit_code_of
+from rig.exit_codes import HELP, PLAIN, WITH_DEVICE, ExitCode, exit_code_of, exit_codes
 from rig.output import patient_output
 
 app = typer.Typer(
@@ -32,13 +32,13 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command(epilog=HELP)(run)
-app.command()(measure)
-app.command()(replay)
+app.command(epilog=PLAIN)(measure)
+app.command(epilog=exit_codes("a radius was obtained", ExitCode.TARGET_LOST))(replay)
 app.command(epilog=HELP)(reproduce)
-app.command()(report)
-app.command()(runs)
-app.command()(view)
-app.command()(compare)
+app.command(epilog=PLAIN)(report)
+app.command(epilog=PLAIN)(runs)
+app.command(epilog=PLAIN)(view)
+app.command(epilog=WITH_DEVICE)(compare)
 app.command(epilog=DOCTOR_EXIT_CODES)(doctor)
 app.add_typer(calibrate_app, name="calibrate")
 app.add_typer(camera_app, name="camera")

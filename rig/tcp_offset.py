@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.errors import ConfigError
 from drivers.interfaces import Arm
+from rig.calibration.errors import UnusableCalibrationError
 from rig.calibration.result import Fingerprints
 
 Six = tuple[float, float, float, float, float, float]
@@ -29,16 +29,16 @@ def tcp_of(depends_on: Fingerprints) -> Six | None:
     try:
         x, y, z, rx, ry, rz = (float(part) for part in text.split())
     except ValueError as error:
-        raise ConfigError(f"{text!r} is no TCP: make the calibration anew") from error
+        raise UnusableCalibrationError(f"{text!r} is no TCP: make the calibration anew") from error
     return x, y, z, rx, ry, rz
 
 
 def check_tcp(arm: Arm, calibrated: Six | None) -> None:
-    """Raise ConfigError when the arm's TCP is another than it was ``calibrated`` with."""
+    """Raise UnusableCalibrationError when the arm has another TCP than when ``calibrated``."""
     now = None if calibrated is None else arm.tcp_offset()
     if calibrated is None or now is None or np.abs(np.subtract(now, calibrated)).max() <= _SAME:
         return
-    raise ConfigError(
+    raise UnusableCalibrationError(
         f"the TCP set on the arm is {_text(now)}, the calibration in use was made with "
         f"{_text(calibrated)} (x, y, z in m, rotation vector in rad): set it back on the pendant, "
         "or calibrate with this one: `rig calibrate`"

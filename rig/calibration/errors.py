@@ -1,6 +1,6 @@
-"""Why a calibration gave no result."""
+"""Why a calibration gave no result, or may not be used."""
 
-from drivers.errors import RigError
+from drivers.errors import ConfigError, RigError
 
 
 class CalibrationError(RigError):
@@ -9,3 +9,7 @@ class CalibrationError(RigError):
 
 class ScaleError(CalibrationError):
     """The arm's motion contradicts the size of the board."""
+
+
+class UnusableCalibrationError(ConfigError):
+    """The rig has no calibration that holds for it as it is; the message says what to type."""

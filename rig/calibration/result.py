@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 
 from drivers.errors import ConfigError
 from rig.calibration.board import BoardConfig
+from rig.calibration.errors import UnusableCalibrationError
 from rig.config_section import Finite, NotNegative, Positive, Section
 
 Vec3 = tuple[Finite, Finite, Finite]
@@ -154,7 +155,9 @@ def load_calibration(path: Path) -> CalibrationFile:
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise ConfigError(f"no calibration file {path}: make it with `rig calibrate`") from error
+        raise UnusableCalibrationError(
+            f"no calibration file {path}: make it with `rig calibrate`"
+        ) from error
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ConfigError(f"cannot read the calibration file {path}: {error}") from error
     if not isinstance(data, dict):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drivers.errors import ConfigError
+from rig.calibration.errors import UnusableCalibrationError
 from rig.calibration.result import (
     CalibrationFile,
     Fingerprints,
@@ -101,13 +101,13 @@ def stale(calibration: CalibrationFile, now: Fingerprints) -> list[str]:
 
 
 def check_usable(calibration: CalibrationFile, now: Fingerprints, path: Path) -> None:
-    """Raise ConfigError unless the file passed its verdict and fits the rig as it is now."""
+    """Raise UnusableCalibrationError unless the file passed its verdict and fits the rig now."""
     verdict = judge(calibration) if calibration.verdict is None else calibration.verdict
     reasons = [*verdict.reasons, *stale(calibration, now)]
     if not verdict.passed and not reasons:
         reasons = ["its verdict is negative: run `rig calibrate` again"]
     if reasons:
-        raise ConfigError(
+        raise UnusableCalibrationError(
             f"the calibration {path} may not be used: {'; '.join(reasons)} "
             "(or run with --uncalibrated, on the nominal values)"
         )

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rig.commands.options import AsJson
-from rig.exit_codes import ExitCode
+from rig.exit_codes import MOVING, WITH_DEVICE, ExitCode
 
 if TYPE_CHECKING:
     from rig.arm_kits import ArmKit
@@ -38,7 +38,7 @@ JogRigFile = Annotated[
 ]
 
 
-@arm_app.command()
+@arm_app.command(epilog=WITH_DEVICE)
 def status(
     arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None, as_json: AsJson = False
 ) -> None:
@@ -54,7 +54,7 @@ def status(
         raise typer.Exit(ExitCode.DEVICE)
 
 
-@arm_app.command()
+@arm_app.command(epilog=MOVING)
 def jog(
     arm: ArmName,
     twist: Annotated[
@@ -109,7 +109,7 @@ def jog(
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 
-@arm_app.command()
+@arm_app.command(epilog=WITH_DEVICE)
 def stop(arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None) -> None:
     """Stop what the arm does now, whoever started it, and see it at rest. No emergency stop.
 
@@ -125,7 +125,7 @@ def stop(arm: ArmName, host: Host = None, port: Port = None, baud: Baud = None) 
         print(kit.stop(WallClock()))
 
 
-@arm_app.command()
+@arm_app.command(epilog=WITH_DEVICE)
 def recover(
     arm: ArmName,
     host: Host = None,
@@ -146,7 +146,7 @@ def recover(
         print(kit.recover(WallClock(), confirm))
 
 
-@arm_app.command()
+@arm_app.command(epilog=WITH_DEVICE)
 def home(
     arm: ArmName,
     host: Host = None,

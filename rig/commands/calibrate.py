@@ -24,7 +24,7 @@ from rig.commands.calibrate_request import (
     with_earlier,
 )
 from rig.commands.options import AsJson, Assignments, RigFile, Seed, warn
-from rig.exit_codes import ExitCode
+from rig.exit_codes import CALIBRATING, PLAIN, ExitCode
 
 if TYPE_CHECKING:
     from rig.calibration.result import CalibrationFile
@@ -35,6 +35,7 @@ calibrate_app = typer.Typer(
     help="Find the camera's intrinsics, its place on the tool and the latency of its images; "
     "without a step: all of them, in order, and a verdict.",
     invoke_without_command=True,
+    epilog=CALIBRATING,
 )
 
 _STEPS: dict[Step, str] = {
@@ -90,10 +91,10 @@ def _command(step: Step) -> Callable[..., None]:
 
 
 for _step, _help in _STEPS.items():
-    calibrate_app.command(_step, help=_help)(_command(_step))
+    calibrate_app.command(_step, help=_help, epilog=CALIBRATING)(_command(_step))
 
 
-@calibrate_app.command()
+@calibrate_app.command(epilog=PLAIN)
 def board(
     squares: Annotated[str, typer.Option(help="Squares in a row x in a column.")] = "7x5",
     square: Annotated[float, typer.Option(help="Side of a square, m.")] = 0.03,

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from drivers.errors import ConfigError, ConnectError, OperateError
 from rig.commands.options import AsJson, warn
-from rig.exit_codes import ExitCode
+from rig.exit_codes import WITH_DEVICE, ExitCode
 
 if TYPE_CHECKING:
     from drivers.camera.settings import CameraSettings
@@ -55,7 +55,7 @@ _ALL_REQUESTS = (
 )  # fmt: skip
 
 
-@camera_app.command("list")
+@camera_app.command("list", epilog=WITH_DEVICE)
 def list_cameras(source: SourceOption = None, as_json: AsJson = False) -> None:
     """List the cameras: stable names, modes, who holds them; --source shows all modes of one."""
     from drivers.camera.v4l2_nodes import list_nodes
@@ -85,7 +85,7 @@ def list_cameras(source: SourceOption = None, as_json: AsJson = False) -> None:
         console.print(f"{node.node}: {names}", soft_wrap=True, highlight=False)
 
 
-@camera_app.command()
+@camera_app.command(epilog=WITH_DEVICE)
 def show(
     source: SourceOption = None,
     save: Annotated[
@@ -124,7 +124,7 @@ def show(
         console.print(f"written: {save}", highlight=False, soft_wrap=True)
 
 
-@camera_app.command()
+@camera_app.command(epilog=WITH_DEVICE)
 def check(
     source: SourceOption = None,
     seconds: Annotated[

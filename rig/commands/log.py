@@ -8,6 +8,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from rig.exit_codes import PLAIN
+
 if TYPE_CHECKING:
     from rig.log.info import LogInfo
     from rig.log.repair import Repair
@@ -20,7 +22,7 @@ LogFile = Annotated[
 ]
 
 
-@log_app.command()
+@log_app.command(epilog=PLAIN)
 def info(
     log: LogFile,
     as_json: Annotated[bool, typer.Option("--json", help="JSON on stdout.")] = False,
@@ -36,7 +38,7 @@ def info(
     _show(found)
 
 
-@log_app.command()
+@log_app.command(epilog=PLAIN)
 def export(
     log: LogFile,
     fmt: Annotated[
@@ -60,7 +62,7 @@ def export(
         typer.echo("the log was never closed: it ends where its writer was stopped", err=True)
 
 
-@log_app.command()
+@log_app.command(epilog=PLAIN)
 def repair(
     log: LogFile,
     out: Annotated[

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from rig.commands.options import Assignments, warn
+from rig.exit_codes import WITH_DEVICE
 
 sim_app = typer.Typer(
     help="An emulated rig behind the real protocols, to try the true drivers on.",
@@ -19,7 +20,7 @@ _NEAREST = {"protective_stop": "alarm", "alarm": "protective_stop", "program_sto
 _CAMERA_FAULTS = "camera_unplug, camera_freeze, camera_repeat"
 
 
-@sim_app.command()
+@sim_app.command(epilog=WITH_DEVICE)
 def serve(
     arm: Annotated[
         Literal["ur", "grbl"], typer.Option(help="A UR5e, or a gantry under grblHAL.")
@@ -78,7 +79,7 @@ def serve(
             clock.sleep_until(clock.now_s() + 0.1)
 
 
-@sim_app.command()
+@sim_app.command(epilog=WITH_DEVICE)
 def fault(
     kind: Annotated[
         str,

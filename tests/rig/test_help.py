@@ -61,6 +61,28 @@ def test_a_command_says_what_it_does_and_what_each_option_is_for(command: str) -
     assert all(words for _, _, words in options(command))
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_says_how_it_may_end(command: str) -> None:
+    end = " ".join(page(command).split("Exit codes: ")[-1].split())
+    assert end.startswith("0 ") and "2 wrong usage or configuration" in end
+    assert end.endswith("130 interrupted.")
+
+
+@pytest.mark.parametrize(
+    ("command", "codes"),
+    [
+        ("run", {0, 1, 2, 3, 4, 5, 6, 130}),
+        ("calibrate", {0, 1, 2, 3, 5, 6, 130}),
+        ("calibrate verify", {0, 1, 2, 3, 5, 6, 130}),
+        ("arm jog", {0, 1, 2, 3, 5, 130}),
+        ("log info", {0, 1, 2, 130}),
+    ],
+)
+def test_the_ways_to_end_are_its_own(command: str, codes: set[int]) -> None:
+    end = " ".join(page(command).split("Exit codes: ")[-1].split())
+    assert {int(one.split()[0]) for one in end.split(", ")} == codes
+
+
 @pytest.mark.parametrize(("name", "value", "words"), ALL)
 def test_an_option_with_a_value_says_what_holds_without_it(
     name: str, value: str, words: str

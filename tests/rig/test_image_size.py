@@ -34,7 +34,7 @@ def save(*, size_px: tuple[int, int], from_images: bool = False) -> None:
 def test_a_run_refuses_images_of_another_size_than_its_calibration_s(here: Path) -> None:
     save(size_px=(1280, 960))
     done = rig("run", "--target", "sphere", "--out", "run", "--set=sim.renderer=raster")
-    assert done.exit_code == 2
+    assert done.exit_code == 6
     assert "640x480" in done.stderr and "1280x960" in done.stderr
     assert "rig calibrate" in done.stderr
     sent = [one["allowed"] for one in lines(open_log(here / "run")) if one["kind"] == "command"]
@@ -44,7 +44,7 @@ def test_a_run_refuses_images_of_another_size_than_its_calibration_s(here: Path)
 def test_calibrating_refuses_images_of_another_size_than_the_pictures(here: Path) -> None:
     save(size_px=(1280, 960), from_images=True)
     done = rig("calibrate", "hand-eye", "--set=sim.renderer=raster")
-    assert done.exit_code == 2
+    assert done.exit_code == 6
     assert "1280x960" in done.stderr
     assert not list((here / "calibration" / "sim-data").glob("still-*"))
 
