@@ -109,3 +109,12 @@ class JointArm(Protocol):
     def joints(self) -> Joints | None:
         """The joints at the newest sample; None before the first, or for an unknown model."""
         ...
+
+
+@runtime_checkable
+class RemarkingArm(Protocol):
+    """What an arm with reservations about itself offers besides ``Arm``."""
+
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know before it moves: what is not guarded, or only assumed."""
+        ...

@@ -8,6 +8,7 @@ from drivers.clock import Clock
 from drivers.errors import ConfigError
 from drivers.interfaces import Arm
 from drivers.ur.arm import UrArm
+from drivers.ur.kinematics import UNGUARDED
 from drivers.ur.recovery import recover_controller
 from drivers.ur.settings import UrSettings
 from drivers.ur.status import read_status
@@ -47,6 +48,9 @@ class UrKit:
             "tool_rotation": status.T_base_tool[:3, :3].tolist(),
             "twist_base": status.twist_base.tolist(),
             "tcp_offset": status.tcp_offset.tolist() if known_tcp else None,
+            "kinematics": status.kinematics,
+            # Without its TCP the model cannot be told, which says nothing about the arm.
+            "unguarded": UNGUARDED if status.kinematics is None and known_tcp else None,
             "state_rate_hz": status.rate_hz,
             "longest_gap_s": status.longest_gap_s,
             "problem": status.problem,

@@ -37,6 +37,7 @@ from rig.realtime import control_conditions
 from rig.recorded.setup import RunSetup, write_setup
 from rig.records import Json, write_config
 from rig.rehearsal import rehearse
+from rig.remarks import tell_remarks
 from rig.rolling_shutter import RollingShutter
 from rig.run_data import RunData
 from rig.safety import Limiter
@@ -94,6 +95,8 @@ def execute(
         wall: Clock = WallClock()
         wall_start_s = wall.now_s()
         with _conditions(rig, config) as (scheduling, deadman), _shown(view, rig) as shown:
+            for remark in tell_remarks(rig.arm):
+                log.event(rig.clock.now_s(), "arm's remark", remark)
             shown.begin(setup)
             loop = RunLoop(
                 clock=rig.clock,

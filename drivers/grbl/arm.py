@@ -67,6 +67,10 @@ class GrblArm:
         """What the controller said about itself, with ``notes`` on what is only assumed."""
         return self._connected().controller
 
+    def remarks(self) -> tuple[str, ...]:
+        """What about the controller could not be verified; raises as ``read_states``."""
+        return self._connected().controller.notes
+
     def explain(self) -> str:
         """What the gantry's state means and what ``recover`` would do, in words."""
         with self._lock:

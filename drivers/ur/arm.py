@@ -17,7 +17,7 @@ from drivers.ur.faults import (
     fault_of,
 )
 from drivers.ur.geometry import to_tool_axes
-from drivers.ur.kinematics import Kinematics, identify
+from drivers.ur.kinematics import UNGUARDED, Kinematics, identify
 from drivers.ur.link import ChildLink
 from drivers.ur.messages import Command, Order
 from drivers.ur.noise import FEWEST_SAMPLES, noise_at_rest
@@ -99,10 +99,20 @@ class UrArm:
         sample = self._link.ring.newest()
         if sample is None:
             return None
+        kinematics = self._identify(sample)
+        return None if kinematics is None else kinematics.joints(sample.q_rad)
+
+    def remarks(self) -> tuple[str, ...]:
+        """That the model is not known, where that is so: its joints are then not guarded."""
+        sample = self._link.ring.newest()
+        known = sample is None or self._identify(sample) is not None
+        return () if known else (UNGUARDED,)
+
+    def _identify(self, sample: Sample) -> Kinematics | None:
         if not self._identified:
             self._kinematics = identify(sample.q_rad, sample.T_base_tool, self._tcp_offset)
             self._identified = True
-        return None if self._kinematics is None else self._kinematics.joints(sample.q_rad)
+        return self._kinematics
 
     def command_twist(self, twist_tool: FloatArray, hold_s: float) -> None:
         """Follow ``twist_tool`` (6,), held in the tool's axes, for ``hold_s`` from now.

@@ -45,6 +45,9 @@ MODELS = (
     Model("UR30", (-0.637, -0.5037), (0.2363, 0.201, 0.1593, 0.1543), _FASTEST_LARGE_RAD_S),
 )
 
+# What follows from a model that is none of these, in words.
+UNGUARDED = "the UR model is not recognised: joint ends and singularities are not guarded"
+
 
 class Kinematics:
     """One model with one TCP; joint positions are those the controller reports."""

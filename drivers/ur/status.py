@@ -9,6 +9,7 @@ from drivers.clock import Clock
 from drivers.errors import ConnectError, OperateError
 from drivers.ur.dashboard import Dashboard
 from drivers.ur.faults import PROGRAM_PLAYING, ROBOT_MODES, RUNTIME_STATES, SAFETY_MODES, fault_of
+from drivers.ur.kinematics import identify
 from drivers.ur.receiver import Sampler
 from drivers.ur.ring import Sample
 from drivers.ur.rtde_codec import RtdeError
@@ -35,6 +36,7 @@ class UrStatus:
     tcp_offset: FloatArray  # (6,) m and rad, NaN where the controller does not say
     rate_hz: float  # of the samples that came
     longest_gap_s: float  # between two arrivals
+    kinematics: str | None  # the model whose tool would be where it is measured; None: no known one
     problem: str | None  # what keeps the arm from moving; a stopped program does not
 
 
@@ -70,6 +72,7 @@ def read_status(host: str, clock: Clock, look_s: float = 0.5, timeout_s: float =
         tcp_offset=last.tcp_offset,
         rate_hz=(len(samples) - 1) / span_s if span_s > 0.0 else 0.0,
         longest_gap_s=float(np.diff(arrivals).max()),
+        kinematics=_model(last),
         problem=None if fault is None else str(fault),
     )
 
@@ -82,6 +85,12 @@ def _listen(stream: RtdeStream, clock: Clock, look_s: float) -> list[Sample]:
         packets, arrival_s = stream.read(remaining_s)
         samples += sampler.samples(packets, arrival_s)
     return samples
+
+
+def _model(sample: Sample) -> str | None:
+    tcp_offset = sample.tcp_offset if np.all(np.isfinite(sample.tcp_offset)) else np.zeros(6)
+    known = identify(sample.q_rad, sample.T_base_tool, tcp_offset)
+    return None if known is None else known.model.name
 
 
 def _dashboard_facts(host: str, timeout_s: float) -> tuple[str, str, bool | None]:

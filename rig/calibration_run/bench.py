@@ -25,6 +25,7 @@ from rig.config import RigConfig
 from rig.deadman import Deadman
 from rig.given_values import hand_eye_of, intrinsics_of
 from rig.image_size import SizedCamera
+from rig.remarks import tell_remarks
 from rig.start_values import ASSUMED, start_intrinsics, start_place
 from rig.tcp_offset import tcp_fingerprint
 
@@ -94,6 +95,7 @@ def open_bench(config: RigConfig, realtime: bool, by_hand: bool = False) -> Benc
         arm = open_arm(config.arm, clock) if listener is None else listener
         opened.pop_all()
     deadman = _deadman(config, clock, arm) if listener is None else None
+    tell_remarks(arm)
     assumed = ASSUMED if intrinsics_of(config) is None else ""
     return Bench(
         *(camera, arm, clock, intrinsics, T_tool_camera, deadman),

@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
+from rig.commands.arm_text import arm_table, jog_facts
 from rig.commands.options import AsJson
 from rig.exit_codes import MOVING, WITH_DEVICE, ExitCode
 
 if TYPE_CHECKING:
     from rig.arm_kits import ArmKit
     from rig.config_safety import SafetyConfig
-    from rig.jog import FloatArray, JogResult
+    from rig.jog import FloatArray
 
 arm_app = typer.Typer(
     help="Look at an arm, jog it, stop it, bring it back, home it.", no_args_is_help=True
@@ -49,7 +48,7 @@ def status(
     if as_json:
         print(json.dumps(facts), flush=True)
     else:
-        Console().print(_table("arm", facts))
+        Console().print(arm_table("arm", facts))
     if facts["problem"] is not None:
         raise typer.Exit(ExitCode.DEVICE)
 
@@ -83,6 +82,7 @@ def jog(
     from rig.deadman import Deadman
     from rig.jog import HOLD_S
     from rig.jog import jog as run_jog
+    from rig.remarks import tell_remarks
     from rig.stop_request import StopRequest
 
     wanted = _numbers(twist)
@@ -94,17 +94,18 @@ def jog(
     with StopRequest() as stop_requested:
         device = kit.open(clock)
         try:
+            tell_remarks(device)
             with closing(Deadman(clock, HOLD_S, device.stop)) as deadman:
                 result = run_jog(
                     device, clock, wanted, in_base, for_s, safety, stop_requested, camera, deadman
                 )
         finally:
             device.close()
-    facts = _jog_facts(result, frame)
+    facts = jog_facts(result, frame)
     if as_json:
         print(json.dumps(facts), flush=True)
     else:
-        Console().print(_table("jog", facts))
+        Console().print(arm_table("jog", facts))
     if result.interrupted:
         raise typer.Exit(ExitCode.INTERRUPTED)
 
@@ -226,40 +227,3 @@ def _numbers(text: str) -> Any:
     if values.shape != (6,):
         raise ConfigError(f"--twist {text!r}: write it as vx,vy,vz,wx,wy,wz")
     return values
-
-
-def _jog_facts(result: "JogResult", frame: str) -> dict[str, Any]:
-    import numpy as np
-
-    error = result.measured - result.commanded
-    return {
-        "frame": frame,
-        "commanded": result.commanded.tolist(),
-        "allowed": result.allowed.tolist(),
-        "measured": result.measured.tolist(),
-        "linear_error_m_s": float(np.linalg.norm(error[:3])),
-        "angular_error_rad_s": float(np.linalg.norm(error[3:])),
-        "limited_by": list(result.limited_by),
-        "latency_s": result.latency_s,
-        "stop_s": result.stop_s,
-        "moved_m": result.moved_m,
-        "states": result.states,
-        "state_rate_hz": result.state_rate_hz,
-        "overruns": result.overruns,
-        "interrupted": result.interrupted,
-    }
-
-
-def _table(title: str, facts: dict[str, Any]) -> Table:
-    table = Table(title=title, show_header=False)
-    for name, value in facts.items():
-        table.add_row(name.replace("_", " "), Text(_words(value)))  # brackets are no markup
-    return table
-
-
-def _words(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_words(part) for part in value) + "]" if value else "–"
-    return "–" if value is None else str(value)

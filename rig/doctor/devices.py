@@ -134,6 +134,9 @@ def judge_arm(facts: Mapping[str, object], again: str) -> Finding:
     if values.get("remote_control") is False:
         advice = "switch the pendant to remote control: the arm refuses programs otherwise"
         return Finding("arm", Status.WARN, f"{text}, in local control", advice, values)
+    if isinstance(unguarded := facts.get("unguarded"), str):
+        advice = "keep it away from its joint ends and singularities by safety.workspace_*"
+        return Finding("arm", Status.WARN, f"{text}, {unguarded}", advice, values)
     scaling = values.get("speed_scaling")
     if isinstance(scaling, float) and scaling < 0.995:
         text = f"{text}, speed slider at {100 * scaling:.0f} %"

@@ -116,6 +116,7 @@ UR = {"controller": "UR5 5.15", "safety": "normal", "mode": "running", "problem"
         (UR | {"remote_control": True, "speed_scaling": 1.0}, Status.OK, "normal"),
         (UR | {"remote_control": False, "speed_scaling": 1.0}, Status.WARN, "local control"),
         (UR | {"remote_control": True, "speed_scaling": 0.5}, Status.WARN, "50 %"),
+        (UR | {"unguarded": "joint ends are not guarded"}, Status.WARN, "joint ends are not"),
         (UR | {"problem": "the arm is in a protective stop"}, Status.FAIL, "protective stop"),
         (GANTRY, Status.OK, "commands act after 140 ms"),
     ],

@@ -1,0 +1,56 @@
+"""What an arm has to say about itself reaches whoever starts it moving."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.ur import kinematics
+from sim_backend.arm import SimulatedArm
+from sim_backend.loopback_ur.process import LoopbackProcess
+from tests.drivers.ur.loopback import start_loopback
+from tests.rig.command_line import rig
+from tests.rig.log_lines import log_lines
+
+REMARK = "something is only assumed"
+
+
+def test_a_run_tells_it_once_and_records_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = SimulatedArm.__init__
+
+    def with_remark(arm: SimulatedArm, *arguments: object) -> None:
+        made(arm, *arguments)  # type: ignore[arg-type]
+        arm.remarks = lambda: (REMARK,)  # type: ignore[attr-defined]
+
+    monkeypatch.setattr(SimulatedArm, "__init__", with_remark)
+    run = ("run", "--target", "sphere", "--duration", "0.5", "--set", "sim.level=features")
+    outcome = rig(*run, "--no-report", "--out", str(tmp_path))
+    assert outcome.stderr.count(f"warning: {REMARK}") == 1
+    events = [line for line in log_lines(tmp_path) if line["kind"] == "event"]
+    assert [event["detail"] for event in events if event["event"] == "arm's remark"] == [REMARK]
+
+
+@pytest.fixture
+def strange() -> Iterator[LoopbackProcess]:
+    with start_loopback() as process:
+        yield process
+
+
+@pytest.mark.realtime
+def test_a_ur_arm_of_a_model_that_is_not_known_says_that_its_joints_are_not_guarded(
+    strange: LoopbackProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = ("--arm", "ur", "--host", strange.host)
+    known = json.loads(rig("arm", "status", *address, "--json").stdout)
+    assert (known["kinematics"], known["unguarded"]) == ("UR5e", None)
+    others = tuple(model for model in kinematics.MODELS if model.name != "UR5e")
+    monkeypatch.setattr(kinematics, "MODELS", others)
+    status = rig("arm", "status", *address, "--json")
+    assert status.exit_code == 0  # it can move all the same
+    assert json.loads(status.stdout)["unguarded"] == kinematics.UNGUARDED
+    pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
+    jog = rig("arm", "jog", *address, "--twist", "0,0,0.01,0,0,0", "--for", "0.1")
+    assert jog.stderr.count(kinematics.UNGUARDED) == 1
