@@ -47,6 +47,16 @@ class RadiusPrior:
         near, far = 1.0 / self.high_m, 1.0 / self.low_m
         return (far - near) ** 2 / 12.0 + (0.5 * (far + near) - self.chi) ** 2
 
+    def excludes(self, chi: float, std: float) -> str:
+        """Why χ̂ ± ``std`` is not what the range has led to expect; "" when it may be."""
+        margin = _EXCLUDED_DEVIATIONS * std
+        if 1.0 / self.high_m - margin <= chi <= 1.0 / self.low_m + margin:
+            return ""
+        return (
+            f"the radius is outside the range it was said to lie in, {1e3 * self.low_m:g} to "
+            f"{1e3 * self.high_m:g} mm"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class TwistNoise:
@@ -216,17 +226,7 @@ class KalmanFilter:
             extrapolated_s=extrapolated_s,
             covariance=factor * P,
             image_covariance=factor * state.image_covariance,
-            doubt=self._innovations.doubt or self._excluded(chi, math.sqrt(variance)),
-        )
-
-    def _excluded(self, chi: float, std: float) -> str:
-        """Whether the radius turned out to lie outside the range it was said to lie in."""
-        prior, margin = self._prior, _EXCLUDED_DEVIATIONS * std
-        if 1.0 / prior.high_m - margin <= chi <= 1.0 / prior.low_m + margin:
-            return ""
-        return (
-            f"the radius is outside the range it was said to lie in, {1e3 * prior.low_m:g} to "
-            f"{1e3 * prior.high_m:g} mm"
+            doubt=self._innovations.doubt or self._prior.excludes(chi, math.sqrt(variance)),
         )
 
 

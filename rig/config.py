@@ -39,6 +39,11 @@ class EstimatorConfig(Section):
     twist_std_rad_s: NotNegative = 5e-4
     # Of an image's instant against the arm's stamps, as good as latencies are calibrated.
     time_std_s: NotNegative = 5e-4
+    # What else kalman is to find. time_offset: by how much images' stamps are late beyond
+    # calibration.latency_s; speed_scale: what the arm's measured speeds are to be multiplied by.
+    states: tuple[Literal["time_offset", "speed_scale"], ...] = ()
+    time_offset_std_s: Positive = 0.03  # of these beforehand
+    speed_scale_std: Positive = 0.05
 
     @model_validator(mode="after")
     def _guess_in_range(self) -> Self:
@@ -47,6 +52,15 @@ class EstimatorConfig(Section):
             raise ValueError(
                 f"radius_guess_m = {self.radius_guess_m:g} is not in "
                 f"radius_range_m = [{low_m:g}, {high_m:g}]"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _states_of_the_filter(self) -> Self:
+        if self.states and self.chosen != "kalman":
+            raise ValueError(
+                f"states = [{', '.join(self.states)}] are for the Kalman filter: "
+                f"set estimator.kind=kalman{self.why_observer}"
             )
         return self
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from drivers.clock import Clock, WallClock, local_timestamp, time_of_day_offset_ns
 from drivers.errors import ConfigError
+from estimator.augmented import AugmentedKalmanFilter, ExtraPrior
 from estimator.batch import BatchLeastSquares
 from estimator.estimate import Estimator
 from estimator.extended import ExtendedKalmanFilter
@@ -209,6 +210,12 @@ def make_observer(config: RigConfig, target: TargetKind) -> Estimator:
     noise = TwistNoise(chosen.twist_std_m_s, chosen.twist_std_rad_s)
     if kind == "limb_plane_ekf":
         return ExtendedKalmanFilter(model, prior, noise)
+    if chosen.states:
+        extra = ExtraPrior(
+            chosen.time_offset_std_s if "time_offset" in chosen.states else 0.0,
+            chosen.speed_scale_std if "speed_scale" in chosen.states else 0.0,
+        )
+        return AugmentedKalmanFilter(model, prior, noise, extra, chosen.time_std_s)
     return KalmanFilter(model, prior, noise, chosen.time_std_s)
 
 
@@ -220,5 +227,7 @@ def make_fusion(config: RigConfig, target: TargetKind, data: RunData, log: Fusio
     # A pipe crosses the whole image: on the mean it was seen in the middle of the readout.
     if target == "sphere" and given.row_time_s != 0.0 and lens is not None:
         shutter = RollingShutter(given.row_time_s, lens)
-    observer = make_observer(config, target)
-    return Fusion(observer, data, log, max_extrapolation_s, given.latency_s, shutter)
+    estimator = make_observer(config, target)
+    if isinstance(estimator, AugmentedKalmanFilter):
+        data.extra_states = lambda: estimator.extra_states
+    return Fusion(estimator, data, log, max_extrapolation_s, given.latency_s, shutter)

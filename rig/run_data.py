@@ -1,12 +1,14 @@
 """A run as arrays: what the summary and the report are computed from."""
 
 from bisect import bisect_left
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.interfaces import ArmState, GreyImage
+from estimator.augmented import ExtraState
 from estimator.estimate import Estimate
 from estimator.image.feature import Feature
 from rig.config import TargetKind
@@ -59,6 +61,8 @@ class RunData:
     features: list[Feature] = field(default_factory=list)  # one per update: what led to it
     snapshots: list[Snapshot] = field(default_factory=list)
     newest_snapshot: Snapshot | None = None
+    # What the estimator found besides s and χ, at the time of asking.
+    extra_states: Callable[[], tuple[ExtraState, ...]] = tuple
     camera_from_tool: FloatArray = field(init=False)  # (6, 6) maps the tool's twist
     frames: int = 0
     frames_lost: int = 0  # received, but without a trustworthy outline

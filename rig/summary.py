@@ -1,11 +1,12 @@
 """The run in one object: what ``--json`` prints and the final table shows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
+from estimator.augmented import ExtraState
 from rig.analysis import Analysis
 from rig.calibration_limits import CalibrationLimits
 from rig.config import RigConfig, TargetKind
@@ -27,6 +28,10 @@ JSON_KEYS = (
     "servo_distance_error_m",
     "radius_std_m",
     "nees",
+    "time_offset_s",
+    "time_offset_std_s",
+    "speed_scale",
+    "speed_scale_std",
     "frames",
     "frames_lost",
     "ticks",
@@ -79,6 +84,7 @@ def summarise(
         "servo_distance_error_m": None,
         "radius_std_m": None if radius_m is None else outcome.data.updates[-1].radius_std_m,
         "nees": None if radius_m is None else analysis.nees,
+        **_extra(outcome.data.extra_states()),
         "frames": outcome.data.frames,
         "frames_lost": outcome.data.frames_lost,
         "ticks": outcome.stats.ticks,
@@ -92,6 +98,7 @@ def summarise(
         "ending": outcome.ending.value,
         "error": None if outcome.error is None else str(outcome.error),
         "target_state": outcome.target_state,
+        "not_observable": [x.name for x in outcome.data.extra_states() if not x.observable],
         "doubts": outcome.data.doubts(),
         "radius_bound_m": analysis.radius_bound_m,
         "holds": outcome.holds,
@@ -104,6 +111,17 @@ def summarise(
         "tick_late_max_s": outcome.stats.late_max_s(),
         "target_base_m": position,
     }
+
+
+def _extra(states: Sequence[ExtraState]) -> dict[str, Json]:
+    """The optional states and their deviations; None where they were not asked for."""
+    known = {state.name: state for state in states}
+    out: dict[str, Json] = {}
+    for name, unit in (("time_offset", "_s"), ("speed_scale", "")):
+        state = known.get(name)
+        out[name + unit] = None if state is None else state.value
+        out[f"{name}_std{unit}"] = None if state is None else state.std
+    return out
 
 
 def limits_of(limits: CalibrationLimits | None) -> dict[str, Json]:
@@ -129,6 +147,7 @@ def table(summary: Mapping[str, Json]) -> Table:
         ("the calibration limits it to", _limits(summary)),
         ("position", where),
         *_progress(summary),
+        *_found(summary),
         ("time to stay within ± 1 %", _number(summary["time_to_1pct_s"], "{:.2f} s")),
         *_servo(summary),
         (
@@ -172,6 +191,22 @@ def _servo(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
         return []
     off_m = _number(summary["servo_distance_error_m"], "{:+.2f} mm", 1e3)
     return [("servo error", f"{_number(summary['servo_error_px'], '{:.2f} px')}, {off_m}")]
+
+
+def _found(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
+    """What the filter found besides the target, where it was asked to."""
+    hidden = summary["not_observable"]
+    rows = []
+    for key, std, name, unit, factor, pattern in (
+        ("time_offset_s", "time_offset_std_s", "time offset of the images", " ms", 1e3, "{:.2f}"),
+        ("speed_scale", "speed_scale_std", "scale of the arm's speed", "", 1.0, "{:.4f}"),
+    ):
+        if summary[key] is not None:
+            values = [_number(summary[k], pattern, factor) for k in (key, std)]
+            seen = not (isinstance(hidden, list) and key.removesuffix("_s") in hidden)
+            note = "" if seen else ", not observable in this run"
+            rows.append((name, f"{values[0]} ± {values[1]}{unit}{note}"))
+    return rows
 
 
 def _log(summary: Mapping[str, Json]) -> str:

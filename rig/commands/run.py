@@ -249,6 +249,12 @@ def _explain_interval(result: "RunResult") -> None:
     """Say what is wrong with an estimate that comes with its uncertainty."""
     for doubt in result.outcome.data.doubts():
         warn(f"doubtful: {doubt}")
+    for state in result.outcome.data.extra_states():
+        if not state.observable:
+            warn(
+                f"{state.name} is not observable in this run: its value is little more than the "
+                "assumption; move at changing speed, or turn the camera against its motion"
+            )
     share = result.outcome.remaining_fraction
     if share > _SETTLED:
         warn(f"uncertain: the 95 % interval of the radius is ± {100 * share:.0f} %; move further")
