@@ -111,6 +111,24 @@ class JointArm(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class CommandDelay:
+    """From a command to the motion it causes."""
+
+    delay_s: float
+    std_s: float
+    measured: bool  # on this arm's own motion; else computed
+
+
+@runtime_checkable
+class DelayedArm(Protocol):
+    """What an arm that follows commands noticeably late offers besides ``Arm``."""
+
+    def command_delay(self) -> CommandDelay:
+        """How late it follows, as far as it knows by now; raises OperateError when it failed."""
+        ...
+
+
 @runtime_checkable
 class RemarkingArm(Protocol):
     """What an arm with reservations about itself offers besides ``Arm``."""

@@ -102,6 +102,7 @@ def _timing_facts(timing: GrblTiming) -> dict[str, Json]:
         "round_trip_s": timing.round_trip_s,
         "state_age_s": timing.state_age_s,
         "command_delay_s": timing.command_delay_s,
+        "command_delay_std_s": timing.command_delay_std_s,
         "command_delay_measured": timing.command_delay_measured,
         "bandwidth_hz": timing.bandwidth_hz,
     }

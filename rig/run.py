@@ -38,7 +38,7 @@ from rig.realtime import control_conditions
 from rig.recorded.setup import RunSetup, write_setup
 from rig.records import Json, write_config
 from rig.rehearsal import rehearse
-from rig.remarks import tell_remarks
+from rig.remarks import delay_facts, tell_remarks
 from rig.rolling_shutter import RollingShutter
 from rig.run_data import RunData
 from rig.safety import Limiter
@@ -178,7 +178,8 @@ def _result(
     analysis = analyse(outcome.data, config, radius_true_m)
     summary = summarise(target, outcome, analysis, config, rig.renderer, wall_s, run_dir)
     summary |= servo_figures(outcome.data, config, rig.intrinsics)
-    return RunResult({**summary, **_of_log(recorded)}, outcome, analysis, rig.intrinsics)
+    summary |= _of_log(recorded) | delay_facts(rig.arm)
+    return RunResult(summary, outcome, analysis, rig.intrinsics)
 
 
 def _of_log(recorded: Recorded) -> dict[str, Json]:

@@ -18,7 +18,7 @@ from drivers.grbl.selftest import measure_delay
 from drivers.grbl.session import Session
 from drivers.grbl.settings import GrblSettings
 from drivers.grbl.timing import GrblTiming
-from drivers.interfaces import ArmState, Joints
+from drivers.interfaces import ArmState, CommandDelay, Joints
 
 FloatArray = NDArray[np.float64]
 
@@ -66,6 +66,13 @@ class GrblArm:
     def controller(self) -> Controller:
         """What the controller said about itself, with ``notes`` on what is only assumed."""
         return self._connected().controller
+
+    def command_delay(self) -> CommandDelay:
+        """How late commands act, computed until a motion has shown it; raises as states do."""
+        timing = self.timing
+        return CommandDelay(
+            timing.command_delay_s, timing.command_delay_std_s, timing.command_delay_measured
+        )
 
     def remarks(self) -> tuple[str, ...]:
         """What about the controller could not be verified; raises as ``read_states``."""

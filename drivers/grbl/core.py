@@ -14,6 +14,7 @@ from drivers.errors import RigError
 from drivers.grbl import faults
 from drivers.grbl.command import Commander
 from drivers.grbl.controller import Controller, longest_line_bytes
+from drivers.grbl.delay import DelayMeter
 from drivers.grbl.errors import SilentError
 from drivers.grbl.flow import Flow
 from drivers.grbl.kinematics import GantryKinematics
@@ -79,6 +80,8 @@ class Core:
         self._ahead_bytes = max(most - longest_line_bytes(len(axes)), 1)
         step, stamp_s = 1.0 / controller.steps_per_unit, stamp_std_s(controller)
         self._meter = MotionMeter(kinematics, settings.twist_window_s, step, stamp_s)
+        # Commands act later than what is kept ahead of the motors.
+        self.delay = DelayMeter(2.0 * lookahead_s + _PREPARED_S, segment_s, stamp_s)
         self._reader = LineReader(settings.baud)
         self._polling = Polling(settings.poll_hz, settings.silence_s, now_s)
         self._mode = _Mode.SETTLE  # the first thing to know is where it stands
@@ -115,10 +118,13 @@ class Core:
         except RigError:
             self.stop()
             raise
+        if self._mode is _Mode.FOLLOW:
+            self.delay.commanded(now_s, twist_tool)
 
     def stop(self) -> None:
         """Cancel the jog; safe at any time, and once is enough."""
         self._commander.clear()
+        self.delay.restart()
         if self._mode is _Mode.FOLLOW:
             self._mode = _Mode.CANCEL
 
@@ -145,6 +151,7 @@ class Core:
         if self._mode is _Mode.FOLLOW and self._commander.expired(now_s):
             expired = self._flow.ahead_s(now_s) > 0.0 or not self._reported_idle()
             self._commander.clear()
+            self.delay.restart()
             if expired:
                 self._mode = _Mode.CANCEL
         out = self._cancel(now_s)
@@ -179,6 +186,7 @@ class Core:
         state = self._meter.add(true_s, mpos)
         if state is not None:
             self._states.append(state)
+            self.delay.measured(state)
         error = faults.from_status(status, self._settings.port, self._mode is not _Mode.FOLLOW)
         if error is not None:
             self.fail(error)

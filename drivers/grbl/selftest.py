@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from drivers.errors import OperateError
+from drivers.grbl.delay import MeasuredDelay
 from drivers.grbl.session import Session
 from drivers.interfaces import ArmState
 
@@ -14,8 +15,8 @@ _WATCH_S = 0.6
 _SETTLE_S = 0.3
 
 
-def measure_delay(session: Session, length_mm: float) -> float:
-    """Move ``length_mm`` along the tool's x and back; the delay from command to motion, s.
+def measure_delay(session: Session, length_mm: float) -> MeasuredDelay:
+    """Move ``length_mm`` along the tool's x and back; the delay from command to motion.
 
     The delay is that of a running stream: from commanding the way back to the measured
     velocity's change of sign, less the time that braking to zero takes. Raises OperateError
@@ -44,7 +45,9 @@ def measure_delay(session: Session, length_mm: float) -> float:
     if crossing_s is None:
         raise OperateError("the gantry did not make its self-test move: look at it, then try again")
     braking_s = speed_m_s * 1e3 / float(np.min(session.controller.acceleration[:3]))
-    return crossing_s - turned_s - braking_s
+    # Commands are looked at once per block.
+    std_s = float(np.hypot(session.timing.stamp_std_s, session.timing.segment_s / np.sqrt(12.0)))
+    return MeasuredDelay(crossing_s - turned_s - braking_s, std_s)
 
 
 def _crossing(states: list[ArmState], after_s: float) -> float | None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from drivers.clock import Clock
 from drivers.grbl.controller import lookahead_blocks, segment_s
 from drivers.grbl.core import Core
+from drivers.grbl.delay import MeasuredDelay
 from drivers.grbl.handshake import introduce
 from drivers.grbl.link import Link
 from drivers.grbl.settings import GrblSettings
@@ -35,6 +36,9 @@ class Session:
         out = self.core.transmit(now_s)
         if out:
             self._link.write(out)
+        found = self.core.delay.result
+        if found is not None and not self.timing.command_delay_measured:
+            self.adopt_delay(found)
 
     def step(self, wait_s: float) -> None:
         """One exchange after waiting up to ``wait_s`` for bytes."""
@@ -46,8 +50,11 @@ class Session:
         while self.clock.now_s() < end_s:
             self.step(wait_s)
 
-    def adopt_delay(self, command_delay_s: float) -> None:
+    def adopt_delay(self, found: MeasuredDelay) -> None:
         """Use a measured command delay in place of the computed one."""
         self.timing = replace(
-            self.timing, command_delay_s=command_delay_s, command_delay_measured=True
+            self.timing,
+            command_delay_s=found.delay_s,
+            command_delay_std_s=found.std_s,
+            command_delay_measured=True,
         )

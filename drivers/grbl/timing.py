@@ -13,6 +13,7 @@ FloatArray = NDArray[np.float64]
 # The firmware prepares ten segments of 10 ms: from leaving the planner to the motors it takes
 # 55 to 95 ms, measured. The claim is the slow end.
 _PREPARED_S = 0.095
+_PREPARED_STD_S = 0.040 / 12.0**0.5
 _PHASE_45_DEG = 0.125  # of a period
 _STAMP_FLOOR_S = 0.0003
 _SEGMENT_S = 0.010  # of the firmware's, measured
@@ -28,7 +29,8 @@ class GrblTiming:
     segment_s: float
     lookahead_s: float
     command_delay_s: float  # from a command to the motion it causes
-    command_delay_measured: bool  # by the self-test; else computed
+    command_delay_std_s: float
+    command_delay_measured: bool  # by the self-test or on the first motion; else computed
     twist_window_s: float  # measured twists are means over this
     state_age_s: float  # of a new state when it becomes readable, typically
     state_age_max_s: float  # between states, with one report lost
@@ -87,6 +89,7 @@ def timing_of(
         segment_s=segment_s,
         lookahead_s=lookahead_s,
         command_delay_s=lookahead_s + _PREPARED_S + 0.5 * median_s,
+        command_delay_std_s=_PREPARED_STD_S,
         command_delay_measured=False,
         twist_window_s=settings.twist_window_s,
         state_age_s=0.5 * settings.twist_window_s + median_s,

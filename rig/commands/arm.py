@@ -82,7 +82,7 @@ def jog(
     from rig.deadman import Deadman
     from rig.jog import HOLD_S
     from rig.jog import jog as run_jog
-    from rig.remarks import tell_remarks
+    from rig.remarks import delay_facts, tell_remarks
     from rig.stop_request import StopRequest
 
     wanted = _numbers(twist)
@@ -99,9 +99,10 @@ def jog(
                 result = run_jog(
                     device, clock, wanted, in_base, for_s, safety, stop_requested, camera, deadman
                 )
+            delay = delay_facts(device)
         finally:
             device.close()
-    facts = jog_facts(result, frame)
+    facts = {**jog_facts(result, frame), **delay}
     if as_json:
         print(json.dumps(facts), flush=True)
     else:

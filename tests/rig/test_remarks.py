@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from drivers.interfaces import CommandDelay
 from drivers.ur import kinematics
 from sim_backend.arm import SimulatedArm
+from sim_backend.loopback_grbl.machine import Machine
+from sim_backend.loopback_grbl.server import LoopbackGantry
 from sim_backend.loopback_ur.process import LoopbackProcess
 from tests.drivers.ur.loopback import start_loopback
 from tests.rig.command_line import rig
@@ -54,3 +57,31 @@ def test_a_ur_arm_of_a_model_that_is_not_known_says_that_its_joints_are_not_guar
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
     jog = rig("arm", "jog", *address, "--twist", "0,0,0.01,0,0,0", "--for", "0.1")
     assert jog.stderr.count(kinematics.UNGUARDED) == 1
+
+
+def test_how_late_an_arm_follows_is_in_the_record_of_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = SimulatedArm.__init__
+
+    def late(arm: SimulatedArm, *arguments: object) -> None:
+        made(arm, *arguments)  # type: ignore[arg-type]
+        arm.command_delay = lambda: CommandDelay(0.14, 0.007, measured=True)  # type: ignore[attr-defined]
+
+    monkeypatch.setattr(SimulatedArm, "__init__", late)
+    run = ("run", "--target", "sphere", "--duration", "0.5", "--set", "sim.level=features")
+    rig(*run, "--no-report", "--out", str(tmp_path))
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["command_delay_s"], summary["command_delay_std_s"]) == (0.14, 0.007)
+    assert summary["command_delay_measured"] is True
+
+
+@pytest.mark.realtime
+def test_jogging_a_gantry_measures_how_late_it_follows(tmp_path: Path) -> None:
+    machine = Machine()
+    start = machine.column(machine.joint_zero)
+    with LoopbackGantry(machine, start, tmp_path / "gantry") as gantry:
+        jog = ("arm", "jog", "--arm", "grbl", "--port", gantry.port, "--json")
+        facts = json.loads(rig(*jog, "--twist", "0.05,0,0,0,0,0", "--for", "2").stdout)
+    assert facts["command_delay_measured"]
+    assert 0.08 < facts["command_delay_s"] < 0.4  # a busy machine looks at commands later

@@ -189,7 +189,7 @@ def test_a_command_right_after_connecting_is_checked_where_the_gantry_is() -> No
 def test_the_self_test_measures_the_delay_of_a_running_stream() -> None:
     gantry = Gantry(UART)
     before = gantry.q()
-    delay_s = measure_delay(gantry.session, 5.0)
+    delay_s = measure_delay(gantry.session, 5.0).delay_s
     assert delay_s == pytest.approx(0.145, abs=0.03)
     assert gantry.q() == pytest.approx(before, abs=2e-3)
     assert not gantry.moving()
