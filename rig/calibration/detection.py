@@ -43,7 +43,8 @@ class BoardDetector:
         # The detector drops boards whose markers and corners do not match; here that is a
         # reason of its own, with a better test.
         parameters = cv2.aruco.CharucoParameters()
-        parameters.checkMarkers = False
+        if hasattr(parameters, "checkMarkers"):  # OpenCV 4.12; before, its own test comes first
+            parameters.checkMarkers = False
         self._detector = cv2.aruco.CharucoDetector(board, parameters)
 
     def find(self, image: GreyImage, fine: bool = True) -> Detection:
