@@ -161,7 +161,6 @@ def _on_the_rig(step: Step, request: Request) -> None:
     from rig.fingerprints import fingerprints
     from rig.start_values import with_nominal
     from rig.stop_request import StopRequest
-    from rig.tcp_offset import tcp_fingerprint
 
     config = request.config()
     path, depends_on = calibration_path(config, request.rig), fingerprints(config)
@@ -183,8 +182,8 @@ def _on_the_rig(step: Step, request: Request) -> None:
         open_bench(config, request.realtime, by_hand) as bench,
         open_calibration_log(log_path, config, bench, realtime) as log,
     ):
-        depends_on |= tcp_fingerprint(bench.arm)
-        store.also_under(bench.conditions())
+        depends_on |= bench.conditions()
+        store.also_under(depends_on)
         if bench.assumed:
             warn(bench.assumed)
         shown = ConsoleProgress(console)
@@ -208,11 +207,11 @@ def _on_the_rig(step: Step, request: Request) -> None:
 @contextmanager
 def _keeping(store: "Store") -> Iterator[None]:
     """Say what an interrupted calibration leaves behind; what failed for good is not resumed."""
-    from rig.calibration.errors import CalibrationError
+    from rig.calibration.errors import CalibrationError, UnusableCalibrationError
 
     try:
         yield
-    except CalibrationError:
+    except (CalibrationError, UnusableCalibrationError):
         raise
     except BaseException:
         if store.stills:
