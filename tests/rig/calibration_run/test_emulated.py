@@ -19,9 +19,9 @@ FOCAL_PX, CENTRE_PX = 400.0, (159.5, 119.5)
 T_TOOL_CAMERA = [0.03, -0.02, 0.06, 0.10, -0.08, 0.12]
 # Where calibrating starts: 14 mm, 3.4° and 4 % away.
 NOMINAL = (
-    "calibration.intrinsics={fx_px: 385, fy_px: 385, cx_px: 164, cy_px: 116}",
-    "calibration.tool_camera_xyz_m=[0.037,-0.012,0.068]",
-    "calibration.tool_camera_rotvec_rad=[0.13,-0.05,0.10]",
+    "calibration.nominal.intrinsics={fx_px: 385, fy_px: 385, cx_px: 164, cy_px: 116}",
+    "calibration.nominal.tool_camera_xyz_m=[0.037,-0.012,0.068]",
+    "calibration.nominal.tool_camera_rotvec_rad=[0.13,-0.05,0.10]",
 )
 # A host that does other things too.
 PATIENT = ("safety.max_state_age_s=0.5", "calibration.plan.poses=16")
