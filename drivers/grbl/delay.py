@@ -14,7 +14,8 @@ FloatArray = NDArray[np.float64]
 _REST_M_S = 1e-3
 _SLOWEST_M_S = 5e-3  # below it a step of the motors takes too long
 _SAME_SPEED = 0.05  # relative: the commands are steady, and the motion is what was commanded
-_LEAST_CHANGE = 0.7  # relative, since the first command
+_LEAST_CHANGE = 0.5  # relative, since the first command
+_START_S = 0.010  # the first command is not followed quite at once
 _VALUES = 8
 _GIVE_UP_S = 3.0  # a controller's clock and pauses of the stream add up
 _RATE_OFF = 0.005  # of a controller's clock
@@ -87,8 +88,10 @@ class DelayMeter:
         behind_m = self._told_m(state.t_s) - (state.T_base_tool[:3, 3] - self._rest_m)
         self._values.append(float(ahead @ behind_m) / change)
         if len(self._values) == _VALUES:
-            off_s = _RATE_OFF * (state.t_s - self._begun_s) * speed / change
-            std_s = math.hypot(float(np.std(self._values)), self._own_std_s, off_s)
+            off_s = _RATE_OFF * (state.t_s - self._begun_s)
+            own_s = math.hypot(self._own_std_s, off_s) * speed / change
+            start_s = _START_S * (speed - change) / change
+            std_s = math.hypot(float(np.std(self._values)), own_s, start_s)
             self.result = MeasuredDelay(float(np.mean(self._values)), std_s)
 
     def _told_m(self, t_s: float) -> FloatArray:
