@@ -15,6 +15,7 @@ from sim_backend.config import SimConfig
 
 TargetKind = Literal["sphere", "cylinder"]
 
+STATING_VARIANCE = ("kalman", "batch", "limb_plane_ekf")
 _PAPER_ALPHA: dict[TargetKind, float] = {"sphere": 2000.0, "cylinder": 500.0}
 
 
@@ -79,7 +80,7 @@ class EstimatorConfig(Section):
     @property
     def states_variance(self) -> bool:
         """Whether the chosen estimator says how sure it is."""
-        return self.chosen in ("kalman", "batch", "limb_plane_ekf")
+        return self.chosen in STATING_VARIANCE
 
     @property
     def why_observer(self) -> str:

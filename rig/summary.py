@@ -1,5 +1,6 @@
 """The run in one object: what ``--json`` prints and the final table shows."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from rich.table import Table
 from estimator.augmented import ExtraState
 from rig.analysis import Analysis
 from rig.calibration_limits import CalibrationLimits
-from rig.config import RigConfig, TargetKind
+from rig.config import STATING_VARIANCE, RigConfig, TargetKind
 from rig.outcome import Ending, RunOutcome
 from rig.records import Json
 
@@ -22,6 +23,7 @@ JSON_KEYS = (
     "relative_error",
     "radius_calibration_std_m",
     "radius_calibration_parts_m",
+    "radius_total_std_m",
     "rms_vs_ideal",
     "time_to_1pct_s",
     "servo_error_px",
@@ -124,9 +126,16 @@ def _extra(states: Sequence[ExtraState]) -> dict[str, Json]:
     return out
 
 
-def limits_of(limits: CalibrationLimits | None) -> dict[str, Json]:
-    """What the calibration limits the radius to; None where its deviations are not known."""
+def limits_of(limits: CalibrationLimits | None, std_m: float | None = None) -> dict[str, Json]:
+    """What the calibration limits the radius to; None where its deviations are not known.
+
+    The total joins to that what the estimator states, ``std_m``.
+    """
+    total_m = None
+    if limits is not None and std_m is not None:
+        total_m = math.hypot(limits.total_m, std_m)
     return {
+        "radius_total_std_m": total_m,
         "radius_calibration_std_m": None if limits is None else limits.total_m,
         "radius_calibration_parts_m": None if limits is None else dict(limits.parts_m),
     }
@@ -175,9 +184,10 @@ def _progress(summary: Mapping[str, Json]) -> list[tuple[str, str]]:
     """How far the estimate came, and how the paper's observer went along or would have."""
     rms = _number(summary["rms_vs_ideal"], "{:.3f} % of z(0)", 1e2)
     left = _number(summary["transient_left"], "{:.3f} %", 1e2)
-    stated = summary["radius_std_m"] is not None
+    interval = f"± {left}" if summary["radius_std_m"] is not None else "no upper end"
+    stated = summary["estimator"] in STATING_VARIANCE
     return [
-        ("95 % interval", f"± {left}") if stated else ("transient left", left),
+        ("95 % interval", interval) if stated else ("transient left", left),
         (
             "rms from the ideal response",
             rms if summary["estimator"] == "observer" else f"{rms} (the paper's observer)",
@@ -224,8 +234,13 @@ def _log(summary: Mapping[str, Json]) -> str:
 def _radius(summary: Mapping[str, Json]) -> str:
     """The radius with its standard deviation where the estimator states one."""
     radius = _number(summary["radius_m"], "{:.4f} mm", 1e3)
-    std_m = summary["radius_std_m"]
-    return radius if std_m is None else f"{radius} ± {_number(std_m, '{:.4f} mm', 1e3)} (1σ)"
+    std_m, total_m = summary["radius_std_m"], summary["radius_total_std_m"]
+    if std_m is None:
+        return radius
+    stated = _number(std_m, "{:.4f} mm", 1e3)
+    if total_m is None:
+        return f"{radius} ± {stated} (1σ)"
+    return f"{radius} ± {_number(total_m, '{:.4f} mm', 1e3)} (1σ, {stated} without calibration)"
 
 
 def _limits(summary: Mapping[str, Json]) -> str:

@@ -140,7 +140,7 @@ def run(
                 write_reports([read_run(run_dir)], run_dir)
             except (OSError, ConfigError) as error:  # what was measured stands all the same
                 _not_complete(run_dir, error)
-    _explain(result, config.estimator.chosen == "observer")
+    _explain(result, config)
     code = exit_code_of_run(result.outcome, result.summary)
     if code is not ExitCode.OK:
         raise typer.Exit(code)
@@ -181,12 +181,14 @@ def _limits(
     from rig.run import make_observer
     from rig.summary import limits_of
 
+    std_m = result.summary["radius_std_m"]
     covariance = None if calibration is None else covariance_of(calibration)
     if covariance is None or result.summary["radius_m"] is None:
         return {}
     data, lens = result.outcome.data, result.intrinsics
     try:
-        return limits_of(calibration_limits(data, config, lens, covariance, make_observer))
+        limits = calibration_limits(data, config, lens, covariance, make_observer)
+        return limits_of(limits, std_m if isinstance(std_m, float) else None)
     except KeyboardInterrupt:
         warn("interrupted: what the calibration limits the radius to was not worked out")
     except (MotionUnknownError, ArithmeticError, ValueError) as error:
@@ -207,16 +209,16 @@ def _not_complete(run_dir: Path, error: Exception) -> None:
     warn(f"warning: {run_dir} is not complete: {error}")
 
 
-def _explain(result: "RunResult", transient: bool) -> None:
+def _explain(result: "RunResult", config: "RigConfig") -> None:
     """Say on stderr what a number alone would hide."""
     outcome = result.outcome
     if outcome.error is not None:
         warn(f"error: {outcome.error}")
     elif result.summary["radius_m"] is None:
         warn(f"no radius: {outcome.ending.value}; {outcome.target_state}")
-    elif result.summary["radius_std_m"] is not None:
+    elif config.estimator.states_variance:
         _explain_interval(result)
-    elif transient and outcome.remaining_fraction > _SETTLED:
+    elif config.estimator.chosen == "observer" and outcome.remaining_fraction > _SETTLED:
         warn(
             f"not settled: about {100 * outcome.remaining_fraction:.0f} % of the first guess's "
             "error is left; run longer, faster or with a larger estimator.alpha"
@@ -256,5 +258,10 @@ def _explain_interval(result: "RunResult") -> None:
                 "assumption; move at changing speed, or turn the camera against its motion"
             )
     share = result.outcome.remaining_fraction
-    if share > _SETTLED:
+    if result.summary["radius_std_m"] is None:
+        warn(
+            "uncertain: this motion did not tell the radius, which is little more than the first "
+            "guess; move further, or faster, across the line of sight"
+        )
+    elif share > _SETTLED:
         warn(f"uncertain: the 95 % interval of the radius is ± {100 * share:.0f} %; move further")

@@ -222,6 +222,45 @@ def test_the_kalman_filter_states_an_interval_and_ends_when_it_is_narrow(
 
 
 @pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (("calibration.latency_s=0.05",), "the latency is wrong"),
+        (
+            ("estimator.radius_range_m=[0.03, 0.1]", "estimator.radius_guess_m=0.05"),
+            "outside the range it was said to lie in, 30 to 100 mm",
+        ),
+        (("motion.velocity_m_s=[0, 0, 0.0005]",), "this motion did not tell the radius"),
+        (
+            (
+                *("estimator.states=[speed_scale]", "motion.velocity_m_s=[0, 0, 0.03]"),
+                "sim.sphere.start.offset_px=[0, 0]",  # so that the camera need not turn
+            ),
+            "speed_scale is not observable",
+        ),
+    ],
+)
+def test_what_makes_the_estimate_doubtful_is_said_in_one_line(
+    settings: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
+    given = [part for one in ("sim.level=features", *settings) for part in ("--set", one)]
+    arguments = ("run", "--target", "sphere", "--duration", "1", "--no-report", *given)
+    result = rig(*arguments, "--json", "--out", str(tmp_path))
+    assert result.exit_code == 0
+    assert len([line for line in result.stderr.splitlines() if words in line]) == 1
+
+
+def test_an_unknown_time_offset_is_found(tmp_path: Path) -> None:
+    settings = ("sim.level=features", "sim.camera.stamps=arrival", "estimator.states=[time_offset]")
+    given = [part for one in settings for part in ("--set", one)]
+    result = run_json("--target", "sphere", "--duration", "2", *given, out=tmp_path)
+    # Each image is late by 40 ms give or take 3, which this run tells over 60 images.
+    assert abs(result["time_offset_s"] - 0.04) < 2e-3
+    assert 0.0 < result["time_offset_std_s"] < 1e-3
+    assert result["speed_scale"] is result["speed_scale_std"] is None
+    assert abs(result["relative_error"]) < 2e-3
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (("--until", "0.5%", "--set", "estimator.kind=observer"), "estimator.kind=kalman"),
