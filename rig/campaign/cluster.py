@@ -117,8 +117,8 @@ class ClusterWorkers:
         ]
         if wrong:
             raise OperateError(
-                f"workers need the activerig of this machine, {here}: {'; '.join(wrong)}. "
-                "Install it in the environment they run in, and start them anew"
+                f"workers need the sources of this machine, {here}: {'; '.join(wrong)}. "
+                "Install the same activerig in the environment they run in, and start them anew"
             )
 
     def _threads(self) -> int:
