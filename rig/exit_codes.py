@@ -57,6 +57,10 @@ CALIBRATING = exit_codes(
     ExitCode.SAFETY,
     ExitCode.CALIBRATION,
 )
+CALIBRATE_HELP = (
+    "Exit codes: 0 done, and whatever is complete passed, 1 internal error, 2 wrong usage or "
+    "configuration, 3 device failure, 5 safety stop, 6 the calibration failed, 130 interrupted."
+)
 
 
 def exit_code_of(error: RigError) -> ExitCode:

@@ -18,7 +18,7 @@ from rig.calibration.pose_candidates import PoseLimits, Scene, StartDoubt
 from rig.calibration.pose_planning import PlannedPose, plan_poses, tour
 from rig.calibration.projection import from_vector, to_vector
 from rig.calibration.rough_scale import check_rough_scale
-from rig.calibration_run.errors import PoseRefusedError
+from rig.calibration_run.errors import FewPicturesError, PoseRefusedError
 from rig.calibration_run.mover import Mover
 from rig.calibration_run.same_place import why_moved
 from rig.calibration_run.stills import Photographer, Still
@@ -75,6 +75,8 @@ class Collector:
         """A still from where the arm stands; raises CalibrationError when it shows no board."""
         try:
             return self._photographer.take()
+        except FewPicturesError:
+            raise
         except CalibrationError as error:
             raise CalibrationError(
                 f"the first look shows no usable board: {error}. Jog the arm until the whole "

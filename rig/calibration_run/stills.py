@@ -13,6 +13,7 @@ from drivers.interfaces import Camera, Frame, GreyImage
 from rig.calibration.averaging import average_views, largest_motion_px
 from rig.calibration.errors import CalibrationError
 from rig.calibration.views import BoardView, PosedView
+from rig.calibration_run.errors import FewPicturesError
 
 # Finds the board's corners; raises CalibrationError with the reason when it cannot.
 Detect = Callable[[GreyImage], BoardView]
@@ -98,7 +99,13 @@ class Photographer:
             raise DeviceTimeoutError(
                 f"no picture within {_TIMEOUT_S} s: check the camera and its connection"
             )
-        raise CalibrationError(reason or "too few pictures came while the arm was at rest")
+        if not reason:
+            raise FewPicturesError(
+                f"only {len(views)} of {_PICTURES} pictures came within "
+                f"{self._clock.now_s() - begin_s:.0f} s of rest: check the camera's rate, its "
+                "cable and what else this machine does"
+            )
+        raise CalibrationError(reason)
 
     def _frames(self, until_s: float) -> "FrameFlow":
         return FrameFlow(self._camera, self._stand, self._clock, until_s)

@@ -27,11 +27,19 @@ class Store:
 
     ``conditions`` names them (board, camera, arm); data taken under others cannot be resumed.
     Without ``resume`` what was there before stays until the first new still is added. Every
-    file is written as a whole or not at all. Raises ConfigError where that is not possible.
+    file is written as a whole or not at all. Raises ConfigError where that is not possible, and
+    where there is nothing to resume; ``instead`` says what to do then.
     """
 
-    def __init__(self, directory: Path, conditions: Mapping[str, str], resume: bool) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        conditions: Mapping[str, str],
+        resume: bool,
+        instead: str = "leave --resume out to start anew",
+    ) -> None:
         self.directory = directory
+        self._instead = instead
         self._conditions = dict(conditions)
         self._begun = resume
         self.stills: list[Still] = []
@@ -120,10 +128,7 @@ class Store:
     def _load(self) -> None:
         path = self.directory / _CONDITIONS
         if not path.exists():
-            raise ConfigError(
-                f"{self.directory} holds nothing to resume: begin with `rig calibrate`, without "
-                "--resume"
-            )
+            raise ConfigError(f"{self.directory} holds nothing to resume: {self._instead}")
         with self._readable():
             before = dict(json.loads(path.read_text(encoding="utf-8")))
         self._resumed = before
@@ -139,7 +144,7 @@ class Store:
             self.stills, self.recording = [], None  # of no use now, though still on disk
             raise ConfigError(
                 f"cannot resume: {', '.join(changed)} changed since the data in "
-                f"{self.directory} were taken; start anew: `rig calibrate` without --resume"
+                f"{self.directory} were taken: {self._instead}"
             )
 
     @contextmanager
@@ -148,8 +153,7 @@ class Store:
             yield
         except (OSError, ValueError, TypeError, KeyError, BadZipFile) as error:
             raise ConfigError(
-                f"the data in {self.directory} cannot be read ({error}): leave --resume out to "
-                "start anew"
+                f"the data in {self.directory} cannot be read ({error}): {self._instead}"
             ) from error
 
     @contextmanager

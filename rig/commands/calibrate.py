@@ -3,12 +3,12 @@
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
 
+from rig.commands.calibrate_board import board
 from rig.commands.calibrate_report import write_report_of
 from rig.commands.calibrate_request import (
     ON_EARLIER_DATA,
@@ -21,12 +21,15 @@ from rig.commands.calibrate_request import (
     RollingShutter,
     Step,
     earlier,
+    instead_of,
     with_earlier,
 )
 from rig.commands.options import AsJson, Assignments, RigFile, Seed, warn
 from rig.exit_codes import CALIBRATING, PLAIN, ExitCode
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rig.calibration.result import CalibrationFile
     from rig.calibration_run.session import Session
     from rig.calibration_run.store import Store
@@ -94,42 +97,7 @@ for _step, _help in _STEPS.items():
     calibrate_app.command(_step, help=_help, epilog=CALIBRATING)(_command(_step))
 
 
-@calibrate_app.command(epilog=PLAIN)
-def board(
-    squares: Annotated[str, typer.Option(help="Squares in a row x in a column.")] = "7x5",
-    square: Annotated[float, typer.Option(help="Side of a square, m.")] = 0.03,
-    marker: Annotated[float, typer.Option(help="Side of a marker, m.")] = 0.022,
-    dictionary: Annotated[str, typer.Option(help="OpenCV's name of the markers.")] = "DICT_4X4_50",
-    paper: Annotated[
-        Literal["a4", "a3", "letter"], typer.Option(help="The paper to print on.")
-    ] = "a4",
-    out: Annotated[Path, typer.Option(help="The PDF to write.")] = Path("board.pdf"),
-) -> None:
-    """Write the board as a PDF to print at 100 %, and its definition for the rig file."""
-    from pydantic import ValidationError
-
-    from drivers.errors import ConfigError
-    from rig.calibration.board import BoardConfig
-    from rig.calibration.board_pdf import board_pdf, definition
-
-    columns, _, rows = squares.partition("x")
-    if not (columns.isdigit() and rows.isdigit()):
-        raise ConfigError(f"--squares {squares}: two numbers like 7x5 are needed")
-    try:
-        config = BoardConfig(
-            squares=(int(columns), int(rows)),
-            square_m=square,
-            marker_m=marker,
-            dictionary=dictionary,
-        )
-    except ValidationError as error:
-        raise ConfigError(f"this board cannot be: {error.errors()[0]['msg']}") from error
-    try:
-        out.write_bytes(board_pdf(config, paper))
-    except OSError as error:
-        raise ConfigError(f"cannot write {out}: {error}") from error
-    warn(f"{out}: print it at 100 %, measure the ruler, then put this into the rig file:")
-    print(definition(config), end="")
+calibrate_app.command(epilog=PLAIN)(board)
 
 
 def _run(step: Step, request: Request) -> None:
@@ -168,7 +136,7 @@ def _on_the_rig(step: Step, request: Request) -> None:
     config = with_nominal(with_earlier(config, step, before))
     console = Console(stderr=True)
     resume = request.resume or step in ON_EARLIER_DATA
-    store = Store(path.with_name(f"{config.name}-data"), depends_on, resume)
+    store = Store(path.with_name(f"{config.name}-data"), depends_on, resume, instead_of(step))
     wall = WallClock()
     start_s = wall.now_s()
     log_path = path.with_name(f"{config.name}-data") / f"log-{step}.mcap"
@@ -238,7 +206,7 @@ def _steps(session: "Session", step: Step, by_hand: bool) -> "CalibrationFile":
     return session.conclude()
 
 
-def _finish(found: "CalibrationFile", step: Step, path: Path) -> None:
+def _finish(found: "CalibrationFile", step: Step, path: "Path") -> None:
     """Say whether the result may be used; a step alone did its part whatever else is missing."""
     verdict = found.verdict
     if verdict is None or verdict.passed:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rig.config import RigConfig
 
 Step = Literal["all", "intrinsics", "hand-eye", "latency", "verify"]
-ON_EARLIER_DATA = ("latency", "verify")
+ON_EARLIER_DATA: tuple[Step, ...] = ("latency", "verify")
 Realtime = Annotated[
     bool, typer.Option("--realtime", help="Run a simulated rig on the wall clock.")
 ]
@@ -112,6 +112,13 @@ class Request:
         extra = [*self.assignments, *([] if self.seed is None else [f"sim.seed={self.seed}"])]
         extra += ["calibration.plan.rolling_shutter=true"] if self.rolling_shutter else []
         return load_config("sphere", self.rig, extra)
+
+
+def instead_of(step: Step) -> str:
+    """What to do where a step has nothing to go on with."""
+    if step in ON_EARLIER_DATA:
+        return "run `rig calibrate hand-eye` first, or `rig calibrate` for everything"
+    return "leave --resume out to start anew"
 
 
 def earlier(step: Step, path: Path, now: "Fingerprints") -> "CalibrationFile | None":

@@ -174,9 +174,25 @@ def test_what_a_calibration_saw_and_did_is_recorded(folder: Path) -> None:
 
 
 def test_nothing_to_resume_is_said(here: Path) -> None:
-    done = calibrate("latency", settings=[])
+    done = calibrate("--resume", settings=[])
     assert done.exit_code == 2
-    assert "nothing to resume" in done.stderr
+    assert "nothing to resume: leave --resume out" in done.stderr
+
+
+@pytest.mark.parametrize("step", ["latency", "verify"])
+def test_a_step_before_its_turn_names_the_one_that_is_missing(here: Path, step: str) -> None:
+    done = calibrate(step, settings=[])
+    assert done.exit_code == 2
+    assert "nothing to resume: run `rig calibrate hand-eye` first" in done.stderr
+
+
+def test_a_board_of_any_size_has_markers_that_fit(here: Path) -> None:
+    done = rig("calibrate", "board", "--square", "0.02")
+    assert done.exit_code == 0
+    assert "marker_m: 0.0147" in done.stdout
+    refused = rig("calibrate", "board", "--square", "0.02", "--marker", "0.022")
+    assert refused.exit_code == 2
+    assert "this board cannot be: marker_m = 0.022 must be between" in refused.stderr
 
 
 def test_the_board_is_printed_with_its_definition(here: Path) -> None:
