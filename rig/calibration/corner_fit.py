@@ -47,6 +47,8 @@ def fit_corners(
     of ``square`` and ``marker``, the sides of both.
     """
     axes = _board_axes(corners, points, square)
+    if not np.all(np.isfinite(axes)):
+        return corners
     gap = 0.5 * (square - marker) / square
     patches = _patches(image, corners, axes, gap)
     values = _start(patches, axes)
@@ -64,7 +66,10 @@ def fit_corners(
 
 def _board_axes(corners: FloatArray, points: FloatArray, square: float) -> FloatArray:
     """What a square's side along the board's x and y is in the image: (k, 2, 2), by columns."""
-    H = np.asarray(cv2.findHomography(points, corners)[0], dtype=float)
+    found = cv2.findHomography(points, corners)[0]
+    if found is None:  # corners on one line, or nonsense: nothing to go by
+        return np.full((len(corners), 2, 2), np.nan)
+    H = np.asarray(found, dtype=float)
     homogeneous = np.column_stack([points, np.ones(len(points))]) @ H.T
     w = homogeneous[:, 2, None, None]
     seen = homogeneous[:, :2, None] / w

@@ -44,7 +44,7 @@ class IntrinsicsResult(Section):
     distortion: Five
     std: IntrinsicsStd
     obtained: str  # how, in words
-    # From pictures alone: hand-eye then takes these values as known before.
+    # From pictures alone.
     from_images: bool = False
     fit_px: NotNegative  # rms distance of the corners
     held_out_px: NotNegative  # the same on images the fit had not seen
@@ -119,6 +119,7 @@ class CalibrationFile(Section):
     made: str  # when, local time
     board: BoardConfig
     intrinsics: IntrinsicsResult | None = None
+    pictures: IntrinsicsResult | None = None  # from pictures alone: hand-eye starts from them
     hand_eye: HandEyeResult | None = None
     latency: LatencyResult | None = None
     verification: VerificationResult | None = None

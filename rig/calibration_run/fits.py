@@ -23,6 +23,9 @@ from rig.calibration_run.stills import Still
 
 FloatArray = NDArray[np.float64]
 
+# Two sets of pictures of one camera agree about its focal length at least this well.
+_SAME_FOCAL, _SURE_SIGMAS = 0.01, 6.0
+
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
@@ -67,6 +70,7 @@ def fit_geometry(
     lens, views = fit_lens(stills), [still.view for still in stills]
     start, model, covariance = lens.intrinsics, lens.model, None
     if given is not None:
+        _check_same_camera(given, lens)
         own = given.std
         std = np.array([own.fx_px, own.fy_px, own.cx_px, own.cy_px, *own.distortion])
         fitted = tuple(bool(one > 0.0) for one in std[4:])
@@ -74,6 +78,20 @@ def fit_geometry(
         start, covariance = intrinsics_of(given), np.diag(std**2)
     hand_eye = solve_hand_eye(views, start, model, board.square_m, settings, covariance)
     return Geometry(lens, hand_eye)
+
+
+def _check_same_camera(given: IntrinsicsResult, seen: IntrinsicsFit) -> None:
+    """Raise CalibrationError where pictures tell of another lens than the rig's camera has."""
+    for name, number in (("fx_px", 0), ("fy_px", 1)):
+        before, now = getattr(given, name), getattr(seen.intrinsics, name)
+        std = float(np.hypot(getattr(given.std, name), seen.std[number]))
+        if abs(now - before) > max(_SAME_FOCAL * before, _SURE_SIGMAS * std):
+            raise CalibrationError(
+                f"the pictures say {name[:2]} = {before:.1f} px, the rig's camera has {now:.1f} ± "
+                f"{seen.std[number]:.1f} px: they are of another camera, zoom, focus or mode. Take "
+                "others for `rig calibrate intrinsics --from-images`, or find the intrinsics with "
+                "the arm: `rig calibrate intrinsics`"
+            )
 
 
 def fit_delay(recording: Recording, geometry: Geometry, rolling: bool = False) -> LatencyFit:

@@ -98,9 +98,6 @@ class Session:
         self.file = before or CalibrationFile(
             rig=config.name, made=local_timestamp(), board=self._board
         )
-        lens = self.file.intrinsics
-        current = lens is not None and lens.depends_on == self._named("camera", "board")
-        self._from_images = lens if lens is not None and lens.from_images and current else None
         self.geometry: Geometry | None = None
         self.latency: LatencyFit | None = None
         self.verification: Verification | None = None
@@ -153,7 +150,7 @@ class Session:
         self._progress.step("fit", f"intrinsics and hand-eye from {len(self._store.stills)} stills")
         with self._stop.at_once():
             geometry = fit_geometry(
-                self._store.stills, self._board, self._plan.hand_eye, self._from_images
+                self._store.stills, self._board, self._plan.hand_eye, self.file.pictures
             )
         height, width = self._store.stills[0].image.shape[:2]
         hand_eye = geometry.hand_eye

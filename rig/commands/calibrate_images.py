@@ -40,6 +40,7 @@ def calibrate_from_images(folder: Path, request: Request) -> None:
     section = section.model_copy(update={"from_images": True, "obtained": _how(fit, folder)})
     file = before or CalibrationFile(rig=config.name, made=local_timestamp(), board=board)
     changed = {"made": local_timestamp(), "board": board, "intrinsics": section}
+    changed["pictures"] = section
     # What was fitted with other intrinsics does not go with these.
     file = file.model_copy(update={**changed, "hand_eye": None, "verification": None})
     file = file.model_copy(update={"verdict": judge(file, config.calibration.required)})

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from drivers.errors import ConfigError
+from rig.commands.options import warn
 
 if TYPE_CHECKING:
     from rig.calibration.result import CalibrationFile, Fingerprints
@@ -124,25 +125,42 @@ def instead_of(step: Step) -> str:
 def earlier(step: Step, path: Path, now: "Fingerprints") -> "CalibrationFile | None":
     """What a step goes on with; of a whole new calibration only intrinsics from pictures stay.
 
-    Raises ConfigError for a file that cannot be read.
+    Pictures taken in another mode of the camera or of another board do not count any more, nor
+    do any where intrinsics are to be found with the arm. Raises ConfigError for a file that
+    cannot be read.
     """
     from rig.calibration.result import load_calibration
 
     if not path.exists():
         return None
     if step != "all":
-        return load_calibration(path)
+        return _without_old_pictures(step, load_calibration(path), now)
     try:
         found = load_calibration(path)
     except ConfigError:
         return None  # it will be replaced
-    lens = found.intrinsics
-    if lens is None or not lens.from_images:
-        return None
-    if any(now.get(key) != then for key, then in lens.depends_on.items()):
+    found = _without_old_pictures(step, found, now)
+    if found.pictures is None:
         return None
     left = {"hand_eye": None, "latency": None, "verification": None, "verdict": None}
-    return found.model_copy(update=left)
+    return found.model_copy(update={**left, "intrinsics": found.pictures})
+
+
+def _without_old_pictures(
+    step: Step, found: "CalibrationFile", now: "Fingerprints"
+) -> "CalibrationFile":
+    lens = found.pictures
+    if lens is None:
+        return found
+    changed = [key for key, then in lens.depends_on.items() if now.get(key) != then]
+    if changed:
+        warn(
+            f"the intrinsics from pictures are not used: the {' and the '.join(changed)} changed "
+            "since; take new pictures for `rig calibrate intrinsics --from-images`"
+        )
+    elif step != "intrinsics":
+        return found
+    return found.model_copy(update={"pictures": None})
 
 
 def with_earlier(config: "RigConfig", step: Step, before: "CalibrationFile | None") -> "RigConfig":
@@ -155,10 +173,11 @@ def with_earlier(config: "RigConfig", step: Step, before: "CalibrationFile | Non
 
     if before is None:
         return config
-    given, lens, hand_eye = config.calibration, before.intrinsics, before.hand_eye
+    given, hand_eye = config.calibration, before.hand_eye
     goes_on = step in ON_EARLIER_DATA
+    lens = before.intrinsics if goes_on else before.pictures
     found: dict[str, object] = {}
-    if lens is not None and (goes_on or (lens.from_images and given.intrinsics is None)):
+    if lens is not None and (goes_on or given.intrinsics is None):
         found["intrinsics"] = intrinsics_config(lens)
     if hand_eye is not None and goes_on:
         found["tool_camera_xyz_m"] = hand_eye.tool_camera_xyz_m

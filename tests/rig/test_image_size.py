@@ -28,7 +28,8 @@ def save(*, size_px: tuple[int, int], from_images: bool = False) -> None:
     width, height = size_px
     lens = {"width": width, "height": height, "from_images": from_images}
     intrinsics = file.intrinsics.model_copy(update=lens)
-    save_calibration(file.model_copy(update={"intrinsics": intrinsics}), calibration_path(config))
+    changed = {"intrinsics": intrinsics, "pictures": intrinsics if from_images else None}
+    save_calibration(file.model_copy(update=changed), calibration_path(config))
 
 
 def test_a_run_refuses_images_of_another_size_than_its_calibration_s(here: Path) -> None:

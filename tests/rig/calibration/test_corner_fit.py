@@ -56,3 +56,10 @@ def test_where_there_are_no_edges_the_corners_stay() -> None:
     points = np.array([[x, y] for x in (0.03, 0.06, 0.09) for y in (0.03, 0.06)])
     corners = 50.0 + 1000.0 * points
     assert np.array_equal(fit_corners(grey, corners, points, 0.03, 0.022), corners)
+
+
+def test_corners_that_no_board_could_have_are_left_as_they_are() -> None:
+    image = np.full((480, 640), 128, np.uint8)
+    corners = np.column_stack([np.full(6, 100.0), np.full(6, 200.0)])
+    points = np.array([[x, y] for x in (0.0, 0.03, 0.06) for y in (0.0, 0.03)])
+    assert np.array_equal(fit_corners(image, corners, points, 0.03, 0.022), corners)

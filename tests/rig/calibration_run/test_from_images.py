@@ -1,6 +1,7 @@
 """``rig calibrate intrinsics --from-images``: pictures in, the intrinsics part out."""
 
 import json
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,10 +10,15 @@ import numpy as np
 import pytest
 
 from rig.calibration.board import BoardConfig
-from rig.calibration.result import load_calibration
+from rig.calibration.result import CalibrationFile, load_calibration, save_calibration
+from rig.commands.calibrate_request import Step, earlier
+from rig.config import RigConfig
+from rig.config_load import load_config
+from rig.fingerprints import fingerprints
 from tests.rig.calibration.synthetic import FloatArray, random_truth, tool_poses
 from tests.rig.calibration.synthetic_image import picture, print_of
 from tests.rig.command_line import Outcome, rig
+from tests.rig.made_calibration import calibration_of
 
 TRUTH = random_truth(3, distortion=False)
 PAPER = print_of(BoardConfig())
@@ -131,3 +137,87 @@ def test_a_file_that_is_no_picture_is_named(here: Path) -> None:
     done = from_images()
     assert done.exit_code == 2
     assert "broken.jpg cannot be read" in done.stderr
+
+
+SMALL = (
+    *("calibration.plan.poses=12", "calibration.plan.verify_poses=2", "sim.renderer=raster"),
+    *("calibration.plan.segment_s=3", "calibration.plan.hand_eye.bootstrap=50"),
+    *("sim.camera.width=320", "sim.camera.height=240", "sim.camera.focal_px=400"),
+)
+
+
+def on_the_rig(step: str, *settings: str) -> Outcome:
+    return rig("calibrate", step, "--json", *(f"--set={one}" for one in (*SMALL, *settings)))
+
+
+def pictures_by(focal_px: float) -> None:
+    """Pictures of the simulated board by a camera of this focal length, in ``pictures``."""
+    started = f"{{fx_px: {focal_px}, fy_px: {focal_px}, cx_px: 159.5, cy_px: 119.5}}"
+    done = on_the_rig(
+        "hand-eye", f"sim.camera.focal_px={focal_px}", f"calibration.intrinsics={started}"
+    )
+    assert done.exit_code == 0, done.stderr
+    for path in Path("calibration/sim-data").glob("still-*.png"):
+        path.rename(Path("pictures") / path.name)
+    shutil.rmtree("calibration")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_step_by_step_from_pictures_to_a_calibration_that_a_run_takes(here: Path) -> None:
+    pictures_by(400.0)
+    assert from_images(*(f"--set={one}" for one in SMALL)).exit_code == 0
+    for step in ("hand-eye", "latency", "verify"):
+        done = on_the_rig(step)
+        assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["verdict"] == "passed"
+    assert found["hand_eye"]["T_tool_camera"][:3] == pytest.approx([0.03, -0.02, 0.06], abs=3e-4)
+    file = load_calibration(here / "calibration" / "sim.yaml")
+    assert file.pictures is not None and file.intrinsics is not None
+    # Known better than from either alone.
+    assert file.intrinsics.std.fx_px < file.pictures.std.fx_px
+    scene = ("sim.renderer=raster", *SMALL[5:])
+    run = rig("run", "--target", "sphere", "--json", *(f"--set={one}" for one in scene))
+    assert run.exit_code == 0, run.stderr
+    assert abs(json.loads(run.stdout)["relative_error"]) < 3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_pictures_of_another_camera_are_told_by_the_rig_s_own(here: Path) -> None:
+    pictures_by(380.0)
+    assert from_images(*(f"--set={one}" for one in SMALL)).exit_code == 0
+    done = on_the_rig("hand-eye")
+    assert done.exit_code == 6
+    assert "the pictures say fx = 380" in done.stderr
+    assert "rig calibrate intrinsics" in done.stderr
+
+
+def file_from_pictures(config: RigConfig) -> CalibrationFile:
+    """A calibration that began with pictures."""
+    file = calibration_of(config)
+    return file.model_copy(update={"pictures": file.intrinsics})
+
+
+@pytest.mark.parametrize("step", ["hand-eye", "all"])
+def test_pictures_of_another_mode_are_no_longer_used(
+    here: Path, step: Step, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, path = load_config("sphere"), here / "sim.yaml"
+    save_calibration(file_from_pictures(config), path)
+    now = fingerprints(config)
+    kept = earlier(step, path, now)
+    assert kept is not None and kept.pictures is not None
+    left = earlier(step, path, {**now, "camera": "another"})
+    assert left is None or left.pictures is None
+    assert (
+        "the intrinsics from pictures are not used: the camera changed" in capsys.readouterr().err
+    )
+
+
+def test_looking_for_intrinsics_with_the_arm_leaves_pictures_aside(here: Path) -> None:
+    config, path = load_config("sphere"), here / "sim.yaml"
+    save_calibration(file_from_pictures(config), path)
+    left = earlier("intrinsics", path, fingerprints(config))
+    assert left is not None and left.pictures is None
