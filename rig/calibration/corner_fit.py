@@ -66,10 +66,9 @@ def fit_corners(
 
 def _board_axes(corners: FloatArray, points: FloatArray, square: float) -> FloatArray:
     """What a square's side along the board's x and y is in the image: (k, 2, 2), by columns."""
-    found = cv2.findHomography(points, corners)[0]
-    if found is None:  # corners on one line, or nonsense: nothing to go by
+    H = np.asarray(cv2.findHomography(points, corners)[0], dtype=float)
+    if H.shape != (3, 3):  # None: corners on one line, or nonsense
         return np.full((len(corners), 2, 2), np.nan)
-    H = np.asarray(found, dtype=float)
     homogeneous = np.column_stack([points, np.ones(len(points))]) @ H.T
     w = homogeneous[:, 2, None, None]
     seen = homogeneous[:, :2, None] / w
