@@ -14,7 +14,7 @@ def board(
     squares: Annotated[str, typer.Option(help="Squares in a row x in a column.")] = "7x5",
     square: Annotated[float, typer.Option(help="Side of a square, m.")] = 0.03,
     marker: Annotated[
-        float | None, typer.Option(help="Side of a marker, m; default: 0.73 of a square's.")
+        float | None, typer.Option(help="Side of a marker, m. By default 0.73 of a square's.")
     ] = None,
     dictionary: Annotated[str, typer.Option(help="OpenCV's name of the markers.")] = "DICT_4X4_50",
     paper: Annotated[

@@ -128,7 +128,7 @@ def test_intrinsics_from_pictures_go_before_a_guess() -> None:
     before = calibration_of(config)
     assert before.intrinsics is not None
     lens = before.intrinsics.model_copy(update={"from_images": True})
-    before = before.model_copy(update={"intrinsics": lens})
+    before = before.model_copy(update={"intrinsics": lens, "pictures": lens})
     start = with_nominal(with_earlier(config, "all", before)).calibration
     assert start.intrinsics is not None and start.intrinsics.fx_px == 790.0
     assert start.tool_camera_xyz_m == (0.0, 0.0, 0.05)
