@@ -28,6 +28,10 @@ _LINE_SHAPE = (0.1, 3.0)
 # Sides of a cylinder face each other, and seen at up to 60 degrees they taper to a third at most.
 _MOST_ALIGNED, _LEAST_TAPER = -0.5, 0.3
 _LEAST_WIDTH_PX = 14.0
+# Variance in px^2 of the derivative that edges are found with (edges_profile). A blurred edge adds
+# its own, and a peak's scatter grows with the cube of the width of the slope it tops.
+_DERIVATIVE_PX2 = 1.1
+_MOST_BLUR_PX2 = 1.4  # variance of 4 px of motion
 _LEAST_SHARE_DEEP = 0.6
 _FEW_WAVES, _ALL_WAVES = 5, 16
 
@@ -68,8 +72,13 @@ def sphere_doubt(fit: EdgeFit, shape: tuple[int, int]) -> str:
     return ""
 
 
-def cylinder_doubt(fit: EdgeFit) -> str:
-    """Why the fit is no trustworthy pair of a cylinder's outline lines; "" if it is."""
+def cylinder_doubt(fit: EdgeFit, blur_px2: float = 0.0) -> str:
+    """Why the fit is no trustworthy pair of a cylinder's outline lines; "" if it is.
+
+    ``blur_px2`` is the variance across the sides of motion and point spread, as far as known.
+    """
+    blur_px2 = min(blur_px2, _MOST_BLUR_PX2)
+    widened = (1.0 + blur_px2 / _DERIVATIVE_PX2) ** 1.5
     for edges in fit.outlines:
         length_px = math.dist(edges.normals[0, :2], edges.normals[-1, :2])
         if length_px < LEAST_LINE_PX:
@@ -77,7 +86,7 @@ def cylinder_doubt(fit: EdgeFit) -> str:
         share = edges.agreeing_share
         if share < _LEAST_SHARE_LINE or longest_gap(edges.agreeing, False) > _MOST_GAP_LINE:
             return f"only {share:.0%} of one of the cylinder's sides is visible"
-        if edges.scale_px > _limit_px(_LINE_SCATTER, edges):
+        if edges.scale_px > _limit_px(_LINE_SCATTER, edges, widened):
             return f"the edges scatter by {edges.scale_px:.1f} px about a straight line"
         _, bend_px = bends_px(edges.residuals_px, edges.agreeing, _BOWS, 2, len(_BOWS))
         if bend_px > _limit_px(_LINE_SHAPE, edges):
@@ -100,5 +109,5 @@ def _crossing_doubt(fit: EdgeFit) -> str:
     return ""
 
 
-def _limit_px(limit: tuple[float, float], edges: OutlineEdges) -> float:
-    return limit[0] + limit[1] * edges.expected_px
+def _limit_px(limit: tuple[float, float], edges: OutlineEdges, widened: float = 1.0) -> float:
+    return limit[0] + limit[1] * edges.expected_px * widened

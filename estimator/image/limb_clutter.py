@@ -38,17 +38,18 @@ _LEAST_PIXELS, _EVERY = 8, 4
 @jit
 def predict_clutter(
     image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], per_sector: int,
-    reach_px: float, read_variance: float,
+    reach_px: float, read_variance: float, mean: FloatArray,
 ) -> bool:  # fmt: skip
     """Fill the rows CLUTTER and CLUTTER_VARIANCE of the located ``pixels`` beside two sides.
 
     The image is pure background from ``reach_px`` outside the outline on; ``per_sector`` is a
-    sector's length in px. CLUTTER is about each sector's mean. False, with nothing filled, where
-    the background is too calm, or too little of it in view, for a prediction to help.
+    sector's length in px. CLUTTER is about each sector's level, which goes to the first column of
+    ``mean`` (sectors, PHOTOMETRY). False, with nothing filled, where the background is too calm, or
+    too little of it in view, for a prediction to help.
     """
     per_side = (starts.shape[0] - 1) // 2
     strips = np.empty((2, per_side * per_sector, _LAYERS))
-    rough = False
+    rough, levels = False, np.empty(2)
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
         _sample(image, pixels, at, per_sector, reach_px, strips[side, :, :1])
@@ -61,13 +62,16 @@ def predict_clutter(
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
         _sample(image, pixels, at, per_sector, reach_px, strips[side])
-        if _centre(strips[side]) < _LEAST_SAMPLES:
+        levels[side], count = _centre(strips[side])
+        if count < _LEAST_SAMPLES:
             return False
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
         weights, variance = _weights(strips[side], read_variance)
         predicted = _predicted(strips[side], weights)
-        _interpolate(pixels, at, per_sector, reach_px, predicted, variance)
+        level = mean[side * per_side : (side + 1) * per_side, 0]
+        _interpolate(pixels, at, per_sector, reach_px, predicted, variance, level)
+        level += levels[side]
     return True
 
 
@@ -118,8 +122,8 @@ def _roughness(strip: FloatArray) -> float:
 
 
 @jit
-def _centre(strip: FloatArray) -> int:
-    """Subtract the mean; all of a row is NaN if some is. Returns how many rows are not."""
+def _centre(strip: FloatArray) -> tuple[float, int]:
+    """Subtract the mean; all of a row is NaN if some is. Returns it and how many rows are not."""
     total, count = 0.0, 0
     for i in range(strip.shape[0]):
         row = np.sum(strip[i])
@@ -128,8 +132,9 @@ def _centre(strip: FloatArray) -> int:
             count += 1
         else:
             strip[i] = np.nan
-    strip -= total / max(count * strip.shape[1], 1)
-    return count
+    level = total / max(count * strip.shape[1], 1)
+    strip -= level
+    return level, count
 
 
 @jit
@@ -202,9 +207,9 @@ def _predicted(strip: FloatArray, weights: FloatArray) -> FloatArray:
 @jit
 def _interpolate(
     pixels: FloatArray, starts: NDArray[np.int64], per_sector: int, reach_px: float,
-    predicted: FloatArray, variance: FloatArray,
+    predicted: FloatArray, variance: FloatArray, level: FloatArray,
 ) -> None:  # fmt: skip
-    """The prediction at one side's pixels, about each sector's mean across the edge."""
+    """The prediction at one side's pixels, about each sector's mean across the edge: ``level``."""
     for k in range(starts.shape[0] - 1):
         total = n = 0.0
         for i in range(starts[k], starts[k + 1]):
@@ -221,5 +226,6 @@ def _interpolate(
             if abs(pixels[DISTANCE, i]) < reach_px:
                 total += pixels[CLUTTER, i]
                 n += 1.0
+        level[k] = total / max(n, 1.0)
         for i in range(starts[k], starts[k + 1]):
-            pixels[CLUTTER, i] -= total / max(n, 1.0)
+            pixels[CLUTTER, i] -= level[k]

@@ -16,7 +16,7 @@ MOST_PIXELS = 352  # across the outline in one sector
 R_GEOMETRY, R_BLUR, R_SHIFT, R_GREY, R_RESIDUAL, MODEL_ROWS = 7, 11, 17, 18, 19, 20
 # Then its weight, space for weighting two rows, and what the model is told.
 WEIGHT, WEIGHTED, E_TAU, E_D, E_NU, E_NV, E_BEND, E_GEOMETRY = 20, 21, *range(23, 29)
-E_CLUTTER, E_CLUTTER_VARIANCE, ALL_ROWS = 32, 33, 34
+E_CLUTTER, E_CLUTTER_VARIANCE, E_SHADE, E_SHADE_SLOPE, ALL_ROWS = 32, 33, 34, 35, 36
 # Motion narrower than this is differentiated as if it were this wide: nearer to zero the
 # derivative is a spike between the pixels.
 _SMOOTH_WIDTH_PX = 0.7
@@ -26,16 +26,18 @@ _SEEN = 1e-9  # of the edge by a pixel, as a share
 @jit_sums
 def edge_rows(
     rows: FloatArray, count: int, along: FloatArray, blur: FloatArray, turn: FloatArray,
-    p: FloatArray, noise: FloatArray, heavy_tail: float, geometry: int,
+    p: FloatArray, level: FloatArray, noise: FloatArray, heavy_tail: float, geometry: int,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill what the normal equations of ``count`` pixels are made of into ``rows``.
 
-    ``along`` (2,) is the sector's place on a cylinder's line and its length, -1 to 1. Returns how
+    ``along`` (2,) is the sector's place on a cylinder's line and its length, -1 to 1; ``level``
+    (2,) the background's level and change along that the contrast is reckoned from. Returns how
     many pixels see the edge and their squared residuals over the expected variance.
     """
     q, m1, h1, m12, m2, h2 = blur[0], blur[1], blur[2], blur[3], blur[4], blur[5]
     cos, sin = turn[0], turn[1]
     p0, p1, p2, p3, p4, p5, p6 = p[0], p[1], p[2], p[3], p[4], p[5], p[6]
+    q0, q1 = level[0], level[1]
     read, texture = noise[0], noise[1]
     place, length = along[0], along[1]
     sphere = geometry == 3
@@ -50,6 +52,8 @@ def edge_rows(
         )
         clutter = rows[E_CLUTTER * MOST_PIXELS + i]
         clutter_variance = rows[E_CLUTTER_VARIANCE * MOST_PIXELS + i]
+        shade_slope = rows[E_SHADE_SLOPE * MOST_PIXELS + i]
+        shade = rows[E_SHADE * MOST_PIXELS + i] + shade_slope * d
         nu, nv, bend = (
             rows[E_NU * MOST_PIXELS + i],
             rows[E_NV * MOST_PIXELS + i],
@@ -68,7 +72,7 @@ def edge_rows(
         _, _, c_w2, c_var = edge_step(d, ba, bb, max(bw, _SMOOTH_WIDTH_PX))
         rise, root, root_1 = edge_rise(d, ba, bb, bw)
         out = 1.0 - share
-        grey -= out * clutter
+        grey -= out * clutter + shade
         rows[R_GREY * MOST_PIXELS + i] = grey
         rows[i], rows[MOST_PIXELS + i] = out, out * tau
         rows[2 * MOST_PIXELS + i] = d - rise
@@ -82,8 +86,8 @@ def edge_rows(
         seen = 1.0 if share > _SEEN and share < 1.0 - _SEEN else 0.0
         seen_count += seen
         chi2 += seen * r * r / variance
-        contrast = p3 + p4 * tau - p0 - p1 * tau - clutter
-        by_d = seen * (contrast * c1 + p2 + (p5 - p2) * share + p6 * root_1)
+        contrast = p3 + p4 * tau - q0 - q1 * tau - clutter
+        by_d = seen * (contrast * c1 + p2 + (p5 - p2) * share + p6 * root_1 + shade_slope)
         by_bend = by_d * bend / 24.0
         by_w2 = seen * (contrast * c_w2 + (p5 - p2) * c1 / 24.0)
         by_var = seen * (contrast * c_var + 0.5 * (p5 - p2) * c1)

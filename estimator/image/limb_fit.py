@@ -14,7 +14,8 @@ from estimator.image.edges_camera import pack_camera
 from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
 from estimator.image.intrinsics import FloatArray, Intrinsics
 from estimator.image.limb_pixels import collect
-from estimator.image.limb_solve import solve_outline, step_rad
+from estimator.image.limb_solve import solve_outline
+from estimator.image.limb_step import step_rad
 from estimator.image.limb_verdict import in_view, verdict
 
 GreyImage = NDArray[np.uint8]
@@ -92,7 +93,7 @@ def _refine(
         return None
     known = _NOTHING if learnt is None else learnt
     s, axis, blur, photometry, stats, noise, model, scatter, step, learnt = solve_outline(
-        image, pixels, starts, s0, a, sector_px, known
+        image, camera, pixels, starts, s0, a, sector_px, known
     )
     solved = math.isfinite(s.sum()) and math.isfinite(scatter.sum())
     converged = solved and intrinsics.fx_px * step_rad(step, s) < _CONVERGED_PX
@@ -116,6 +117,11 @@ def _refine(
         usable=usable,
         learnt=learnt,
     )
+
+
+def blur_variance_px2(learnt: FloatArray) -> float:
+    """Variance of the point spread and of the motion across the outline, of `LimbFit.learnt`."""
+    return float(learnt[0] / 6.0 + learnt[1] / 12.0)
 
 
 def _alike(blur: FloatArray, known: FloatArray) -> bool:

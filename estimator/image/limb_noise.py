@@ -10,6 +10,9 @@ from estimator.jit import jit
 _LEAST_READ_VARIANCE = 0.1  # rounding to whole grey levels is 1/12
 # A side's shading stands out from five standard deviations on, and from 0.3 grey per px.
 _STANDS_OUT, _NO_SHADING = 25.0, 0.1
+# A departure from foretold shading is chance up to so many standard deviations, and smaller than
+# half a grey per px (per root of a px) it is not worth the freedom it takes.
+_CHANCE_SD, _FORETOLD_VARIANCE = 2.0, 0.25
 
 
 @jit
@@ -47,13 +50,13 @@ def learn_shading(
 ) -> None:
     """Expect each side of a cylinder to be shaded alike all along it.
 
-    Its normal is the same all along, so the slopes across and the limb terms are about their means,
-    as far as these stand out.
+    Its normal is the same all along, so the level is about its mean, and so are the slopes across
+    and the limb terms, as far as their means stand out.
     """
     per_side = photometry.shape[0] // 2
     for side in range(2):
         first, last = side * per_side, (side + 1) * per_side
-        for j in (5, 6):
+        for j in (3, 5, 6):
             total = doubt = count = 0.0
             for k in range(first, last):
                 if stats[k, N_IN] >= 6.0:
@@ -61,20 +64,23 @@ def learn_shading(
                     doubt += spread[k, j]
                     count += 1.0
             level, variance = total / max(count, 1.0), doubt / max(count, 1.0) ** 2
-            noise = _STANDS_OUT * variance + _NO_SHADING
+            noise = _STANDS_OUT * variance + _NO_SHADING if j > 3 else 0.0
             mean[first:last, j] = level * max(0.0, 1.0 - noise / (level * level + 1e-12))
 
 
 @jit
 def learn_ridge(
     photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray,
-    mean: FloatArray, first: bool, predicted: bool,
+    mean: FloatArray, first: bool, cylinder: bool, predicted: bool,
+    shaded: bool,
 ) -> None:  # fmt: skip
     """Learn from all sectors how large slopes and limb terms are here (empirical Bayes).
 
     ``first``: p was found almost without a prior, so that its own scatter is subtracted, and four
     standard deviations of what that leaves uncertain are added; later the usual expectation step.
+    ``cylinder``: its sides' levels are about their means, and their scatter is learnt too.
     ``predicted``: the background is known from elsewhere, and only the target's terms are learnt.
+    ``shaded``: so is the target's shading, and what departs from it is to stand out.
     """
     square = np.zeros(PHOTOMETRY)
     scatter = np.zeros(PHOTOMETRY)
@@ -88,11 +94,16 @@ def learn_ridge(
             scatter[j] += spread[k, j]
     if count == 0:
         return
-    for j in (1, 2, 4, 5, 6):
-        if predicted and j < 3:
+    for j in range(1, PHOTOMETRY):
+        if (predicted and j < 3) or (j == 3 and (first or not cylinder)):
             continue
         second = (square[j] + scatter[j]) / count
         if first:
             second = max(square[j] - scatter[j], 0.0) / count
             second += 4.0 * scatter[j] / count * np.sqrt(2.0 / count)
+        if shaded and j > 4:
+            if first:
+                chance = scatter[j] * (1.0 + _CHANCE_SD * np.sqrt(2.0 / count))
+                second = max(square[j] - chance, 0.0) / count
+            second = max(second, _FORETOLD_VARIANCE)
         ridge[j] = 1.0 / max(second, 1e-4)

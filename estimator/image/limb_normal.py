@@ -50,9 +50,10 @@ def accumulate(
     ``moved_by`` (geometry,) is how far the geometry is from that at which the pixels were located,
     ``margin_px`` bounds the outline's error. ``noise`` (sectors, 2): variances of reading and of
     the background. ``ridge`` (PHOTOMETRY,) and ``mean`` (sectors, PHOTOMETRY): the inverse prior
-    variance of p about its mean. ``predicted``: what is under the edge is `predict_clutter`'s, and
-    the pixels outside tell no more about it. ``information`` (sectors, n, n), ``score``
-    (sectors, n) with n geometry and blur parameters; ``back`` (sectors, PHOTOMETRY, n + 1):
+    variance of p about its mean. ``predicted``: what is under the edge is `predict_clutter`'s, its
+    level that of ``mean``, and the pixels outside tell no more about it. ``information``
+    (sectors, n, n), ``score`` (sectors, n) with n geometry and blur parameters; ``back``
+    (sectors, PHOTOMETRY, n + 1):
     p = back[:, n] - back[:, :n] @ step;
     ``spread`` (sectors, PHOTOMETRY): variances of p. ``heavy_tail``: the degrees of freedom of the
     residuals, 0 when p is unknown. ``work`` (3, ALL_ROWS * MOST_PIXELS) holds no NaN.
@@ -70,19 +71,22 @@ def accumulate(
     gtt = np.empty((width, width + 1))
     fit = np.empty((PHOTOMETRY, width + 1))
     turn = np.array([np.cos(turn_rad), np.sin(turn_rad)])
-    along = np.empty(2)
+    along, level = np.empty(2), np.empty(2)
     reach = reach_px(blur, margin_px)
     stats[:] = 0.0
     per_line = (starts.shape[0] - 1) // 2
     along[1] = 2.0 / max(per_line, 1)
     for k in range(starts.shape[0] - 1):
         p, noise_k, stats_k = photometry[k], noise[k], stats[k]
+        # A fitted level would follow the clutter that the prediction missed, and give the sectors
+        # that look dark under the edge more weight: their outlines are off to one side.
+        level[0], level[1] = (mean[k, 0], 0.0) if predicted else (p[0], p[1])
         along[0] = (k % max(per_line, 1) + 0.5) * along[1] - 1.0
         n_edge, n_out, n_in = parted(
             pixels, starts[k], starts[k + 1], moved_by, reach, rows, outside, inside
         )
         stats_k[N_EDGE], stats_k[CHI_EDGE] = edge_rows(
-            rows, n_edge, along, blur, turn, p, noise_k, heavy_tail, geometry
+            rows, n_edge, along, blur, turn, p, level, noise_k, heavy_tail, geometry
         )
         _gram(rows, n_edge, MODEL_ROWS, gram)
         for i in range(PHOTOMETRY):

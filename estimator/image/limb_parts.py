@@ -11,6 +11,8 @@ from estimator.image.limb_edge import (
     E_GEOMETRY,
     E_NU,
     E_NV,
+    E_SHADE,
+    E_SHADE_SLOPE,
     E_TAU,
     MOST_PIXELS,
     R_GREY,
@@ -25,6 +27,8 @@ from estimator.image.limb_pixels import (
     HERE,
     NU,
     NV,
+    SHADE,
+    SHADE_SLOPE,
     TAU,
 )
 from estimator.jit import jit, jit_inlined, jit_sums
@@ -71,6 +75,9 @@ def parted(
     for i in range(n_in):
         inside[i] = 1.0
         inside[3 * MOST_PIXELS + i] = np.sqrt(inside[2 * MOST_PIXELS + i])
+        at = start + last + i
+        shade = pixels[SHADE, at] + pixels[SHADE_SLOPE, at] * inside[2 * MOST_PIXELS + i]
+        inside[4 * MOST_PIXELS + i] -= shade
     for j in range(moved_by.shape[0]):
         _copied(pixels, GEOMETRY + j, start + first, n_edge, edge, (E_GEOMETRY + j) * MOST_PIXELS)
     _copied(pixels, TAU, start + first, n_edge, edge, E_TAU * MOST_PIXELS)
@@ -82,6 +89,8 @@ def parted(
     _copied(pixels, CLUTTER, start + first, n_edge, edge, E_CLUTTER * MOST_PIXELS)
     place = E_CLUTTER_VARIANCE * MOST_PIXELS
     _copied(pixels, CLUTTER_VARIANCE, start + first, n_edge, edge, place)
+    _copied(pixels, SHADE, start + first, n_edge, edge, E_SHADE * MOST_PIXELS)
+    _copied(pixels, SHADE_SLOPE, start + first, n_edge, edge, E_SHADE_SLOPE * MOST_PIXELS)
     return n_edge, n_out, n_in
 
 

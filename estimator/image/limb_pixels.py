@@ -12,7 +12,7 @@ from estimator.jit import jit
 # the geometry; then the distance to where the outline has moved since; last, zero or filled by
 # `predict_clutter`, what the background's grey is about its level, and the variance of that.
 X, Y, J0, J1, J2, J3, GREY, TAU, U, V, DISTANCE, NU, NV, BEND, GEOMETRY = range(15)
-HERE, CLUTTER, CLUTTER_VARIANCE, ROWS = 18, 19, 20, 21
+HERE, CLUTTER, CLUTTER_VARIANCE, SHADE, SHADE_SLOPE, ROWS = 18, 19, 20, 21, 22, 23
 _COARSE_PX, _TILE_PX, _SMALL_TILE_PX = 32, 8, 2
 _NEWTON_STEPS = 12
 _MOST_SECTORS = 512
@@ -223,6 +223,7 @@ def _by_sector(
         pixels[TAU, at] = taus[i]
         pixels[U, at], pixels[V, at] = u, v
         pixels[CLUTTER, at] = pixels[CLUTTER_VARIANCE, at] = 0.0
+        pixels[SHADE, at] = pixels[SHADE_SLOPE, at] = 0.0
     return pixels, starts
 
 
@@ -240,4 +241,5 @@ def thinned(
             for j in range(DISTANCE):
                 some[j, i] = pixels[j, starts[k] + (i - some_starts[k]) * stride]
             some[CLUTTER, i] = some[CLUTTER_VARIANCE, i] = 0.0
+            some[SHADE, i] = some[SHADE_SLOPE, i] = 0.0
     return some, some_starts

@@ -7,8 +7,6 @@ from estimator.image.cone import moved, outline_frame
 from estimator.image.edges_camera import GreyImage
 from estimator.image.intrinsics import FloatArray
 from estimator.image.limb_blur import (
-    BLUR_MEAN,
-    BLUR_SD,
     BLUR_START,
     BLUR_START_CYLINDER,
     diagonalised,
@@ -16,12 +14,13 @@ from estimator.image.limb_blur import (
 )
 from estimator.image.limb_clutter import predict_clutter
 from estimator.image.limb_edge import ALL_ROWS, BLUR, MOST_PIXELS, PHOTOMETRY
-from estimator.image.limb_linear import cholesky, solve_column, solve_fixed
 from estimator.image.limb_locate import locate
 from estimator.image.limb_noise import learn_ridge, learn_shading, noise_levels
 from estimator.image.limb_normal import STATS, accumulate
 from estimator.image.limb_parts import reach_px
 from estimator.image.limb_pixels import thinned
+from estimator.image.limb_shade import predict_shading
+from estimator.image.limb_step import back_substitute, covariances, next_step, step_rad
 from estimator.jit import jit
 
 # What an image tells about the next one: the blur, the turn of its axes, the two noise levels.
@@ -47,8 +46,8 @@ _FREE = np.array([1e-6, 1 / 400.0, 1 / 16.0, 1e-6, 1 / 400.0, 1 / 16.0, 1 / 400.
 
 @jit
 def solve_outline(
-    image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], s: FloatArray, a: FloatArray,
-    sector_px: int, known: FloatArray,
+    image: GreyImage, camera: FloatArray, pixels: FloatArray, starts: NDArray[np.int64],
+    s: FloatArray, a: FloatArray, sector_px: int, known: FloatArray,
 ) -> tuple[
     FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray,
     FloatArray, FloatArray, FloatArray,
@@ -80,6 +79,7 @@ def solve_outline(
     s_there, a_there, moved_by = s, a, np.zeros(geometry)
     work = np.zeros((3, ALL_ROWS * MOST_PIXELS))
     mean, texture = np.zeros((sectors, PHOTOMETRY)), 0.0  # positive where clutter is predicted
+    shaded = False
     used, used_starts = thinned(pixels, starts, _COARSE_STRIDE)
     locate(used, s, a, frame)
     index = -2
@@ -94,7 +94,7 @@ def solve_outline(
             stats, work,
         )  # fmt: skip
         if index >= 0:
-            total, step = _step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
+            total, step = next_step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
             moved_by += step[:geometry]
             s, a = moved(s_there, a_there, frame, moved_by)
             blur += step[geometry:]
@@ -104,7 +104,7 @@ def solve_outline(
         if not s[0] ** 2 + s[1] ** 2 + s[2] ** 2 > 1.0 + 1e-9:
             s = s * np.nan
             break
-        _back_substitute(back, step, photometry)
+        back_substitute(back, step, photometry)
         if index == _GEOMETRY_STEPS - 1:
             blur[:] = BLUR_START if geometry == 3 else BLUR_START_CYLINDER
         all_next = index == _COARSE_STEPS - 1 or (index < 0 and known.shape[0] > 0)
@@ -115,14 +115,18 @@ def solve_outline(
             s_there, a_there, frame, moved_by = s, a, outline_frame(s, a), np.zeros(geometry)
             locate(used, s, a, frame)
             if all_next and geometry == 4:
-                texture = _foresee(image, used, starts, sector_px, blur, noise, ridge)
+                texture = _foresee(image, used, starts, sector_px, blur, noise, ridge, mean)
+                shaded = predict_shading(
+                    image, camera, used, starts, s, a, blur, turn_rad,
+                    reach_px(blur, _CLUTTER_MARGIN_PX),
+                )  # fmt: skip
         _learn(
             photometry, spread, stats, ridge, mean, index - _COARSE_STEPS, geometry == 4,
-            texture > 0.0,
+            texture > 0.0, shaded,
         )  # fmt: skip
         if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and step_rad(step, s) < _CONVERGED_RAD:
             break
-    model, scatter = _covariances(total, information, score, frame, s)
+    model, scatter = covariances(total, information, score, frame, s)
     learnt = np.empty(KNOWN)
     learnt[:BLUR], learnt[BLUR] = blur, turn_rad
     learnt[BLUR + 1], learnt[BLUR + 2] = noise[0, 0], np.mean(noise[:, 1]) + texture
@@ -132,11 +136,11 @@ def solve_outline(
 @jit
 def _foresee(
     image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], sector_px: int,
-    blur: FloatArray, noise: FloatArray, ridge: FloatArray,
+    blur: FloatArray, noise: FloatArray, ridge: FloatArray, mean: FloatArray,
 ) -> float:  # fmt: skip
     """Predict clutter if there is some; the variance known so far, which this replaces, or 0."""
     reach = reach_px(blur, _CLUTTER_MARGIN_PX)
-    if not predict_clutter(image, pixels, starts, sector_px, reach, noise[0, 0]):
+    if not predict_clutter(image, pixels, starts, sector_px, reach, noise[0, 0], mean):
         return 0.0
     texture = max(float(np.mean(noise[:, 1])), _LEAST_TEXTURE)
     noise[:, 1], ridge[2] = 0.0, _NO_SLOPE
@@ -146,107 +150,10 @@ def _foresee(
 @jit
 def _learn(
     photometry: FloatArray, spread: FloatArray, stats: FloatArray, ridge: FloatArray,
-    mean: FloatArray, age: int, cylinder: bool, predicted: bool,
+    mean: FloatArray, age: int, cylinder: bool, predicted: bool, shaded: bool,
 ) -> None:  # fmt: skip
     """What to expect of the photometry, ``age`` steps after all pixels came in."""
     if cylinder and 1 <= age < _SHADING_STEPS:
         learn_shading(photometry, spread, stats, mean)
     if 0 <= age < _LEARNING_STEPS:
-        learn_ridge(photometry, spread, stats, ridge, mean, age == 0, predicted)
-
-
-@jit
-def step_rad(step: FloatArray, s: FloatArray) -> float:
-    """How far a step of the geometry moves the outline, seen from the camera."""
-    turn = abs(step[1]) + abs(step[2])
-    return float(turn + abs(step[0]) / (s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
-
-
-@jit
-def _back_substitute(back: FloatArray, step: FloatArray, photometry: FloatArray) -> None:
-    """The photometry that goes with a step of the shared parameters."""
-    n = step.shape[0]
-    for k in range(photometry.shape[0]):
-        for j in range(PHOTOMETRY):
-            value = back[k, j, n]
-            for i in range(n):
-                value -= back[k, j, i] * step[i]
-            photometry[k, j] = value
-
-
-@jit
-def _step(
-    information: FloatArray, score: FloatArray, blur: FloatArray, geometry: int, no_blur: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Total information with the prior, and the step that keeps the widths non-negative."""
-    n = score.shape[1]
-    total = np.zeros((n, n))
-    rhs = np.zeros(n)
-    for k in range(score.shape[0]):
-        for i in range(n):
-            rhs[i] += score[k, i]
-            for j in range(n):
-                total[i, j] += information[k, i, j]
-    motion2 = max(blur[1] + blur[4], 0.0)
-    for i in range(BLUR):
-        mean, sd = BLUR_MEAN[i], BLUR_SD[i]
-        if i == 2 or i == 5:
-            sd = 0.02 + 0.4 * np.sqrt(motion2)
-        elif geometry == 4 and i > 2:
-            mean, sd = 0.0, 0.02 + 0.3 * motion2
-        total[geometry + i, geometry + i] += 1.0 / sd**2
-        rhs[geometry + i] -= (blur[i] - mean) / sd**2
-    return total, _kept_positive(total, rhs, blur, geometry, no_blur)
-
-
-@jit
-def _kept_positive(
-    total: FloatArray, rhs: FloatArray, blur: FloatArray, geometry: int, no_blur: bool
-) -> FloatArray:
-    """Solution of total step = rhs that leaves q, M1 and M2 non-negative (active set)."""
-    n = rhs.shape[0]
-    fixed = np.zeros(n, dtype=np.bool_)
-    value = np.zeros(n)
-    if no_blur:
-        fixed[geometry:] = True
-    step = solve_fixed(total, rhs, fixed, value)
-    for _ in range(3):
-        worst, at = -1e-9, -1
-        for i in (0, 1, 4):
-            low = blur[i] + step[geometry + i]
-            if not fixed[geometry + i] and low < worst:
-                worst, at = low, i
-        if at < 0:
-            break
-        fixed[geometry + at] = True
-        value[geometry + at] = -blur[at]
-        step = solve_fixed(total, rhs, fixed, value)
-    return step
-
-
-@jit
-def _covariances(
-    total: FloatArray, information: FloatArray, score: FloatArray, frame: FloatArray,
-    s: FloatArray,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Covariance of s from the model's information, and from the scatter of the scores."""
-    n = total.shape[0]
-    inverse = np.zeros((n, n))
-    factor = total.copy()
-    cholesky(factor)
-    for i in range(n):
-        inverse[i, i] = 1.0
-        solve_column(factor, inverse, i)
-    meat = np.zeros((n, n))
-    for k in range(score.shape[0]):
-        for i in range(n):
-            for j in range(n):
-                meat[i, j] += score[k, i] * score[k, j]
-                total[i, j] -= information[k, i, j]
-    # What is left of total is the prior's information, itself a (perfect) measurement.
-    scatter = inverse @ (meat + total) @ inverse
-    length = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-    to_s = np.empty((3, 3))
-    to_s[:, 0], to_s[:, 1], to_s[:, 2] = frame[2], -length * frame[1], length * frame[0]
-    g = to_s.T.copy()
-    return to_s @ inverse[:3, :3].copy() @ g, to_s @ scatter[:3, :3].copy() @ g
+        learn_ridge(photometry, spread, stats, ridge, mean, age == 0, cylinder, predicted, shaded)

@@ -1,5 +1,6 @@
 """One target from image to image: predicted, searched near there, refined, and certified."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +15,7 @@ from estimator.image.edges_refine import refined
 from estimator.image.edges_trust import cylinder_doubt, sphere_doubt
 from estimator.image.feature import Feature, Measurement
 from estimator.image.intrinsics import FloatArray, Intrinsics
+from estimator.image.limb_fit import blur_variance_px2
 from estimator.image.moments import MomentsMeter
 
 Target = Literal["sphere", "cylinder"]
@@ -153,9 +155,13 @@ class TargetTracker:
             return Measurement(None, _NOT_FOUND[self.target])
         shape = (image.shape[0], image.shape[1])
         doubt = sphere_doubt(fit, shape) if axis is None else cylinder_doubt(fit)
-        if doubt:
+        if doubt and (axis is None or cylinder_doubt(fit, math.inf)):
             return Measurement(None, doubt)
-        result, self._learnt = refined(image, self.intrinsics, self._camera, fit, self._learnt)
+        result, learnt = refined(image, self.intrinsics, self._camera, fit, self._learnt)
+        # A blurred side's edges scatter more; how blurred it is only the refinement tells.
+        if doubt and (learnt is None or cylinder_doubt(fit, blur_variance_px2(learnt))):
+            return Measurement(None, doubt)
+        self._learnt = learnt
         return result
 
     def _plausible(self, feature: Feature, reference: Feature, frames_gone: int) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from estimator.image.cone import outline_frame
 from estimator.image.edges_camera import pack_camera
 from estimator.image.limb_clutter import predict_clutter
+from estimator.image.limb_edge import PHOTOMETRY
 from estimator.image.limb_fit import refine_cylinder
 from estimator.image.limb_locate import locate
 from estimator.image.limb_pixels import CLUTTER, CLUTTER_VARIANCE, DISTANCE, U, V, collect
@@ -28,17 +29,21 @@ S = cylinder_s(np.array([0.2, -0.1, 10.0]), AXIS)
 SECTOR_PX, REACH_PX = 22, 2.8
 
 
-def predicted(background: float | FloatArray) -> tuple[FloatArray, NDArray[np.int64]] | None:
-    """Located pixels (ROWS, n) of the cylinder before ``background`` and their sectors (n,)."""
+def predicted(
+    background: float | FloatArray,
+) -> tuple[FloatArray, NDArray[np.int64], FloatArray] | None:
+    """Located pixels (ROWS, n), their sectors (n,) and the sectors' levels of ``background``."""
     rng = np.random.default_rng(5)
     look = replace(hard_look(rng), background=background)
     image = render(S, AXIS, look, rng)
     camera = pack_camera(DEFAULT_INTRINSICS)
     pixels, starts = collect(image, camera, S, AXIS, 6.0, 4.5, float(SECTOR_PX))
     locate(pixels, S, AXIS, outline_frame(S, AXIS))
-    seen = predict_clutter(image, pixels, starts, SECTOR_PX, REACH_PX, look.noise_grey**2)
+    mean = np.zeros((len(starts) - 1, PHOTOMETRY))
+    read = look.noise_grey**2
+    seen = predict_clutter(image, pixels, starts, SECTOR_PX, REACH_PX, read, mean)
     sectors = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    return (pixels, sectors) if seen else None
+    return (pixels, sectors, mean[:, 0]) if seen else None
 
 
 def about_means(values: FloatArray, groups: NDArray[np.int64]) -> FloatArray:
@@ -53,7 +58,7 @@ def test_what_lies_under_the_edge_is_told_from_what_lies_beside_it(correlation_p
     background = texture(np.random.default_rng(1), correlation_px)
     found = predicted(background)
     assert found is not None
-    pixels, sectors = found
+    pixels, sectors, levels = found
     # Where the outline is, REACH_PX deep. Each sector's mean is left open.
     at = np.abs(pixels[DISTANCE]) < 0.5
     truth = background[pixels[V, at].astype(int), pixels[U, at].astype(int)]
@@ -61,6 +66,9 @@ def test_what_lies_under_the_edge_is_told_from_what_lies_beside_it(correlation_p
     alone = about_means(truth, sectors[at])
     assert np.std(left) < 0.75 * np.std(alone)
     assert np.mean(pixels[CLUTTER_VARIANCE, at]) < 0.5 * np.var(truth)
+    whole = levels[sectors[at]] + pixels[CLUTTER, at]
+    assert np.std(truth - whole) < 0.75 * np.std(truth)
+    assert abs(np.mean(truth - whole)) < 0.2 * np.std(truth)
 
 
 @pytest.mark.parametrize("background", [20.0, 57.0])
