@@ -67,7 +67,8 @@ def _one(
     as_json: bool,
 ) -> None:
     from rig.replay.engine import replay as run_again
-    from rig.summary import JSON_KEYS, table
+    from rig.summary import JSON_KEYS
+    from rig.summary_table import table
 
     done = run_again(recording, assignments, source)
     if as_json:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rig.analysis import analyse
-from rig.summary import JSON_KEYS, radius_obtained, summarise, table
+from rig.summary import JSON_KEYS, radius_obtained, summarise
+from rig.summary_table import table
 from tests.rig.fakes import P_BASE_M, RADIUS_M, Bench, make_bench
 
 

@@ -198,7 +198,7 @@ def sequence(
     look: Look | None = None,
     intrinsics: Intrinsics = DEFAULT_INTRINSICS,
 ) -> Iterator[Sample]:
-    """Frames of issue 2's table: ``target`` sphere or cylinder, ``kind`` clean or hard.
+    """The README's sequences: ``target`` sphere or cylinder, ``kind`` clean or hard.
 
     Each seed has its own path, light, texture and blur direction; in a hard sequence light and
     blur direction also turn slowly. ``look`` replaces the kind's appearance.
