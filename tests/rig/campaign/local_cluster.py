@@ -3,12 +3,14 @@
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 HOST = "127.0.0.1"
 _QUIET = ("--no-dashboard",)
+_STARTS_S = 100.0
 _LEAVES_S = 10.0
 
 
@@ -37,6 +39,7 @@ def local_cluster(workers: int) -> Iterator[LocalCluster]:
     scheduler = _dask("scheduler", "--host", HOST, "--port", str(port), *_QUIET)
     cluster = LocalCluster(f"tcp://{HOST}:{port}", scheduler)
     try:
+        _wait_for(port)
         for _ in range(workers):
             cluster.add_worker()
         yield cluster
@@ -44,6 +47,20 @@ def local_cluster(workers: int) -> Iterator[LocalCluster]:
         for process in (*cluster.workers, scheduler):
             process.kill()
             process.wait(_LEAVES_S)
+
+
+def _wait_for(port: int) -> None:
+    """Until the scheduler listens: on a busy machine its start takes long."""
+    deadline_s = time.monotonic() + _STARTS_S
+    while True:
+        try:
+            socket.create_connection((HOST, port), timeout=1.0).close()
+        except OSError:
+            if time.monotonic() > deadline_s:
+                raise
+            time.sleep(0.05)
+        else:
+            return
 
 
 def _dask(command: str, *arguments: str) -> subprocess.Popen[bytes]:

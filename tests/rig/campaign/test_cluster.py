@@ -28,6 +28,12 @@ PLAIN = dump_config(load_config("sphere"))
 CASES = cases_of("sphere", ["kalman"], ["constant", "circle"], ["clean"], 8)
 
 
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine workers take long to start."""
+    monkeypatch.setattr("rig.campaign.cluster._FIRST_WORKER_S", 150.0)
+
+
 def job(case: Case) -> Job:
     return Job(case, PLAIN, ("sim.level=features", "run.duration_s=0.5"), sources_here())
 
