@@ -43,19 +43,21 @@ def radial_difference_px(first, second, centre):
 
 @pytest.mark.parametrize("lens_name", LENSES)
 @pytest.mark.parametrize("distance_m", [0.22, 0.4])
-def test_outlines_of_spheres_agree_within_a_twentieth_of_a_pixel(lens_name, distance_m):
+def test_outlines_of_spheres_agree_within_a_fortieth_of_a_pixel(lens_name, distance_m):
     start = StartPose(distance_m=distance_m, tilt_y_deg=20, offset_px=(60.3, -40.2))
     scene, lens, T = view("sphere", start, **FLAT, **LENSES[lens_name])
     exact, seen = coverage(drawn(scene, lens, T)), coverage(gl_drawn(scene, lens, T))
     v, u = np.mgrid[0 : lens.height, 0 : lens.width]
     centre = np.array([(exact * u).sum(), (exact * v).sum()]) / exact.sum()
     difference = radial_difference_px(exact, seen, centre)
-    assert np.sqrt(np.mean(difference**2)) < 0.05
+    assert np.sqrt(np.mean(difference**2)) < 0.025
+    # What a radius sees of it, of about 60 px.
+    assert abs(np.mean(difference)) < 0.01
 
 
 @pytest.mark.parametrize("lens_name", LENSES)
 @pytest.mark.parametrize("spin_deg", [0, 30, 75])
-def test_outlines_of_cylinders_agree_within_a_twentieth_of_a_pixel(lens_name, spin_deg):
+def test_outlines_of_cylinders_agree_within_a_fortieth_of_a_pixel(lens_name, spin_deg):
     start = StartPose(distance_m=0.4, tilt_x_deg=15, spin_deg=spin_deg)
     scene, lens, T = view("cylinder", start, **FLAT, **LENSES[lens_name])
     exact, seen = coverage(drawn(scene, lens, T)), coverage(gl_drawn(scene, lens, T))
@@ -70,7 +72,8 @@ def test_outlines_of_cylinders_agree_within_a_twentieth_of_a_pixel(lens_name, sp
         middle = round(float((block * np.arange(block.shape[1])).sum() / block.sum()))
         difference = (other - block).sum(axis=0) / 20
         errors += [difference[:middle].sum(), difference[middle:].sum()]
-    assert np.sqrt(np.mean(np.square(errors))) < 0.05
+    assert np.sqrt(np.mean(np.square(errors))) < 0.025
+    assert abs(np.mean(errors)) < 0.01
 
 
 @pytest.mark.parametrize("target", ["sphere", "cylinder"])
