@@ -34,9 +34,9 @@ class ArmState:
     t_s: float  # the instant the sample was true
     T_base_tool: FloatArray  # (4, 4)
     twist_tool: FloatArray  # (6,) measured, in the tool's own axes
-    # Standard deviations of ``t_s`` and of ``twist_tool`` (6,), None where nobody knows them.
-    t_std_s: float | None = None
-    twist_std: FloatArray | None = None
+    # How uncertain ``t_s`` and ``twist_tool`` are, None where nobody knows.
+    t_std_s: float | None = None  # standard deviation
+    twist_covariance: FloatArray | None = None  # (6, 6)
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ class Fusion:
         self._waiting: deque[Sighting] = deque()
         self._periods_s: deque[float] = deque(maxlen=_PERIODS)
         self._newest_image: tuple[int, float] | None = None  # seq and exposure instant
-        self._twist_std: FloatArray | None = None  # as the arm last reported it
+        self._twist_covariance: FloatArray | None = None  # as the arm last reported it
         self._doubt = ""
         self.state: ArmState | None = None
         self.newest_sighting: Sighting | None = None
@@ -160,10 +160,10 @@ class Fusion:
 
     def _note_uncertainty(self, state: ArmState) -> None:
         """Tell the estimator how uncertain twists are, where the arm knows it."""
-        if state.twist_std is not None and state.twist_std is not self._twist_std:
-            self._twist_std = state.twist_std
-            spread = self._camera_from_tool * state.twist_std
-            self._motion.covariance = spread @ spread.T
+        reported = state.twist_covariance
+        if reported is not None and reported is not self._twist_covariance:
+            self._twist_covariance = reported
+            self._motion.covariance = self._camera_from_tool @ reported @ self._camera_from_tool.T
 
     def _covered(self, t_s: float) -> bool:
         return self.state is not None and self.state.t_s >= t_s

@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 _JOINT_NAMES = ("x", "y", "z", "roll", "pitch", "spin")
 _LINEAR = (True, True, True, False, False, False)
 _STEPS_PER_SAMPLE = 2  # of 1 ms: the controller reports at 500 Hz
+_TURNED_RAD = 0.02  # changes a twist's covariance by as little
 
 
 class SimulatedArm:
@@ -29,7 +30,7 @@ class SimulatedArm:
         self._next = 0  # number of the first sample not returned yet
         self._closed = False
         self._q: FloatArray | None = None  # (6,) joints at the newest reported sample
-        self._twist_std: FloatArray | None = None  # (6,), that of the first sample for all
+        self._noise_at: tuple[FloatArray, FloatArray] | None = None  # those joints, covariance
         # Compiles the kernels now rather than in the middle of a run.
         _measure(np.zeros((1, 6)), np.zeros((1, 6)), np.zeros((1, 6)), self._steps)
 
@@ -52,14 +53,20 @@ class SimulatedArm:
         numbers, noise = numbers[kept], noise[kept]
         q, qd = history.entries(numbers)
         self._q = q[-1]
-        if self._twist_std is None:
-            self._twist_std = np.linalg.norm(tool_jacobian(self._q) * self._noise, axis=1)
+        covariance = self._covariance(self._q)
         poses, twists = _measure(q, qd, noise, self._steps)
         times = history.start_s + numbers * history.step_s
         return [
-            ArmState(float(t), T_base_tool=T, twist_tool=twist, twist_std=self._twist_std)
+            ArmState(float(t), T_base_tool=T, twist_tool=twist, twist_covariance=covariance)
             for t, T, twist in zip(times, poses, twists, strict=True)
         ]
+
+    def _covariance(self, q: FloatArray) -> FloatArray:
+        """Of the newest twists (6, 6): the joints' noise, a new one once the wrist has turned."""
+        if self._noise_at is None or np.abs(q - self._noise_at[0])[3:].max() > _TURNED_RAD:
+            spread = tool_jacobian(q) * self._noise
+            self._noise_at = q, spread @ spread.T
+        return self._noise_at[1]
 
     def joints(self) -> Joints | None:
         """The joints at the newest reported sample; None before the first."""

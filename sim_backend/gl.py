@@ -89,9 +89,10 @@ class GlRenderer:
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._gl)
             mujoco.mjr_render(viewport, self._scene, self._gl)
             mujoco.mjr_readPixels(rgb, None, viewport, self._gl)
-        grey: NDArray[np.float32] = rgb[::-1, :, 0].astype(np.float32)
+        grey = np.asarray(rgb[::-1, :, 0], np.float32)
         if self._map is not None:
-            grey = cv2.remap(grey, *self._map, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            seen = cv2.remap(grey, *self._map, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            grey = np.asarray(seen, np.float32)
         size = (self._lens.width, self._lens.height)
         return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
 

@@ -76,19 +76,19 @@ class MotionMeter:
             T_base_tool=self._kinematics.tool_pose(q),
             twist_tool=self._kinematics.tool_twist(q, qd),
             t_std_s=self._stamp_std_s / math.sqrt(len(times)),
-            twist_std=self._twist_std(q, slope, middle_s, float(times[-1] - times[0])),
+            twist_covariance=self._covariance(q, slope, middle_s, float(times[-1] - times[0])),
         )
         self._last_s, self._last_slope = middle_s, slope
         return state
 
-    def _twist_std(
+    def _covariance(
         self, q: FloatArray, slope: FloatArray, middle_s: float, window_s: float
     ) -> FloatArray:
-        """Of the tool's twist (6,), the axes' errors taken as independent."""
+        """Of the tool's twist (6, 6), the axes' errors taken as independent."""
         change = np.zeros_like(slope)
         if self._last_slope is not None:
             change = (slope - self._last_slope) / (middle_s - self._last_s)
         axes = rate_std(self._step, slope, change, self._stamp_std_s, window_s)
-        J = self._kinematics.tool_jacobian(q)
-        std: FloatArray = np.sqrt(J**2 @ self._kinematics.joint_rates_of(axes) ** 2)
-        return std
+        spread = self._kinematics.tool_jacobian(q) * self._kinematics.joint_rates_of(axes)
+        covariance: FloatArray = spread @ spread.T
+        return covariance

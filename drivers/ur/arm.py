@@ -206,13 +206,13 @@ def _order(order: Order) -> Command:
     return Command(order, np.zeros(6), 0.0)
 
 
-def _state(sample: Sample, t_std_s: float, twist_std: FloatArray | None) -> ArmState:
+def _state(sample: Sample, t_std_s: float, twist_covariance: FloatArray | None) -> ArmState:
     return ArmState(
         t_s=sample.t_s,
         T_base_tool=sample.T_base_tool,
         twist_tool=to_tool_axes(sample.T_base_tool[:3, :3], sample.twist_base),
         t_std_s=t_std_s,
-        twist_std=twist_std,
+        twist_covariance=twist_covariance,
     )
 
 

@@ -12,7 +12,7 @@ _MOVING = 1e-3  # m/s and rad/s on the mean
 
 
 def noise_at_rest(samples: list[Sample]) -> FloatArray | None:
-    """Standard deviation (6,) of the reported twist of an arm that rests, alike in all directions.
+    """Covariance (6, 6) of the reported twist of an arm that rests, alike in all directions.
 
     None where the samples are too few or the arm moves: then nobody knows it.
     """
@@ -21,4 +21,4 @@ def noise_at_rest(samples: list[Sample]) -> FloatArray | None:
         return None
     std = twists.std(axis=0)
     linear, angular = (float(np.sqrt(np.mean(part**2))) for part in (std[:3], std[3:]))
-    return np.repeat([linear, angular], 3)
+    return np.diag(np.repeat([linear**2, angular**2], 3))

@@ -55,7 +55,7 @@ class Encoder:
         self._offset_ns = offset_ns
         self._newest: ArmState | None = None
         self._t_std_s: float | None = None
-        self._twist_std: FloatArray | None = None
+        self._twist_covariance: FloatArray | None = None
         self._shape: tuple[int, ...] | None = None
 
     def ns(self, t_s: float) -> int:
@@ -92,8 +92,10 @@ class Encoder:
             known: dict[str, Any] = {}
             if state.t_std_s is not None and state.t_std_s != self._t_std_s:
                 known["t_std_s"] = self._t_std_s = state.t_std_s
-            if state.twist_std is not None and state.twist_std is not self._twist_std:
-                known["twist_std"], self._twist_std = state.twist_std.tolist(), state.twist_std
+            covariance = state.twist_covariance
+            if covariance is not None and covariance is not self._twist_covariance:
+                known["twist_covariance"] = covariance.tolist()
+                self._twist_covariance = covariance
             yield self._json(
                 "arm",
                 state.t_s,

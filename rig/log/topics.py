@@ -84,7 +84,7 @@ TOPICS = (
             T_base_tool={**_array(3, 4), "description": "upper three rows"},
             twist_tool={**_array(6), "description": "measured, m/s and rad/s, tool axes"},
             t_std_s=_NUMBER,
-            twist_std=_array(6),
+            twist_covariance=_array(6, 6),
         ),
     ),
     Topic(

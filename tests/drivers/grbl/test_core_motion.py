@@ -87,7 +87,7 @@ def test_the_stated_uncertainty_covers_the_measured_one(machine: Machine) -> Non
     gantry.states.clear()
     gantry.drive(0.03 * X, 2.0)
     error = np.std([state.twist_tool[0] for state in gantry.states])
-    stated = np.median([state.twist_std[0] for state in gantry.states])
+    stated = np.sqrt(np.median([state.twist_covariance[0, 0] for state in gantry.states]))
     assert error < gantry.session.timing.velocity_std_m_s(0.03) < 0.002
     assert error < 1.5 * stated < 0.003
     assert gantry.session.timing.velocity_std_m_s(0.03, 1.0) > 0.015  # what the mean hides
@@ -106,8 +106,9 @@ def test_each_state_states_an_uncertainty_that_covers_its_error_also_while_accel
     for state in gantry.states[5:]:
         q, qd = (part[: machine.axes] for part in gantry.firmware.history.at(state.t_s))
         true = gantry.kinematics.tool_twist(q, qd)
-        known = state.twist_std > 0.0
-        scores += list(np.abs(state.twist_tool - true)[known] / state.twist_std[known])
+        std = np.sqrt(np.diag(state.twist_covariance))
+        known = std > 0.0
+        scores += list(np.abs(state.twist_tool - true)[known] / std[known])
         assert np.abs(state.twist_tool - true)[~known] == pytest.approx(0.0, abs=1e-9)
     assert np.percentile(scores, 68.0) < 1.5
     assert np.percentile(scores, 95.0) < 3.0
