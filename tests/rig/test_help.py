@@ -1,6 +1,8 @@
 """What --help says: each command and option in words, with its default and its unit."""
 
 import re
+import subprocess
+import sys
 from functools import cache
 
 import pytest
@@ -95,3 +97,11 @@ def test_an_option_with_a_value_says_what_holds_without_it(
 def test_a_measure_has_a_unit(name: str, value: str, words: str) -> None:
     if "float" in value.lower():
         assert any(unit in f" {words.lower()}" for unit in UNITS)
+
+
+def test_python_m_rig_is_the_same_command():
+    ran = subprocess.run(
+        [sys.executable, "-m", "rig", "--help"], capture_output=True, text=True, check=True
+    )
+    assert "compare" in ran.stdout
+    assert "python -m rig" in ran.stdout

@@ -156,6 +156,21 @@ def test_measured_states_differ_from_the_truth_by_unbiased_noise_of_the_configur
     np.testing.assert_allclose(twists.mean(axis=0), 0.0, atol=4 * 5e-4 / np.sqrt(len(twists)))
 
 
+def test_twists_are_as_uncertain_and_as_correlated_as_stated():
+    rig, clock = built("sphere")
+    follow(rig, clock, TWIST, 0.5)  # the wrist has turned since the first sample
+    clock.sleep_until(1.0)
+    rig.arm.read_states()
+    clock.sleep_until(41.0)
+    states = rig.arm.read_states()
+    stated, twists = states[-1].twist_covariance, np.array([s.twist_tool for s in states])
+    np.testing.assert_allclose(stated, states[0].twist_covariance)
+    seen = np.linalg.solve(np.linalg.cholesky(stated), twists.T)
+    np.testing.assert_allclose(np.cov(seen), np.eye(6), atol=0.05)
+    std = np.sqrt(np.diag(stated))
+    assert abs(stated / np.outer(std, std) - np.eye(6)).max() > 0.1
+
+
 def test_measured_poses_are_quantised_by_the_encoders_and_no_further_off():
     rig, clock = built("sphere")
     states = follow(rig, clock, TWIST, 0.4)
