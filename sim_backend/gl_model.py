@@ -11,12 +11,12 @@ from sim_backend.scene import Cylinder, Scene, Sphere
 
 FloatArray = NDArray[np.float64]
 
-# MuJoCo draws polyhedra with their corners on the surface, which look a little too small: with
-# its defaults (28 slices, 16 stacks) a sphere's outline by 5e-3, with these by 7e-5 from above and
-# 6e-5 from elsewhere (the area of the projected corners' hull). The radius makes up for that.
-_SPHERE_SLICES, _SPHERE_STACKS, _SPHERE_GROWN = 256, 128, 1.0 + 6.7e-5
-# Only around its axis is a cylinder round; the outline of its sides is 6e-7 too small.
-_CYLINDER_SLICES, _CYLINDER_STACKS = 1024, 2
+# MuJoCo draws polyhedra with their corners on the surface, which look too small: a sphere with
+# its defaults (28 slices, 16 stacks) by 5e-3, with these by 7e-5 from above and 6e-5 from elsewhere
+# (the area of the projected corners' hull), a cylinder's sides by 2.5e-5 on average over its turns
+# (1 - sin(x)/x for x = pi/slices). The radii make up for that.
+_SLICES, _STACKS = 256, 128
+_SPHERE_GROWN, _CYLINDER_GROWN = 1.0 + 6.7e-5, 1.0 + 2.5e-5
 # Of the texture across the floor; odd, so that releases of MuJoCo agree on where it starts.
 _FLOOR_PERIODS = 33
 _BOARD_TEXELS = 2048  # a side of the board's texture; a power of two, for unbiased mipmaps
@@ -47,14 +47,11 @@ def _mjcf(scene: Scene, width: int, height: int, focal_px: float) -> str:
     diffuse = 1.0 - scene.ambient
     solids = "\n".join(_geom(solid) for solid in scene.solids)
     board, board_asset = ("", "") if scene.board is None else _board_xml(scene.board)
-    slices, stacks = _CYLINDER_SLICES, _CYLINDER_STACKS
-    if any(isinstance(solid, Sphere) for solid in scene.solids):
-        slices, stacks = _SPHERE_SLICES, _SPHERE_STACKS
     return f"""
 <mujoco model="scene">
   <visual>
     <headlight active="0"/>
-    <quality numslices="{slices}" numstacks="{stacks}" offsamples="4" shadowsize="0"/>
+    <quality numslices="{_SLICES}" numstacks="{_STACKS}" offsamples="4" shadowsize="0"/>
     <global offwidth="{width}" offheight="{height}"/>
     <map znear="0.01" zfar="60"/>
     <rgba haze="0 0 0 0" fog="0 0 0 0"/>
@@ -89,7 +86,8 @@ def _geom(solid: Sphere | Cylinder) -> str:
         return f'<geom type="sphere" size="{radius}" pos="{centre}" {look}/>'
     end = solid.half_length_m * solid.axis
     ends = f"{_text(solid.middle_m - end)} {_text(solid.middle_m + end)}"
-    return f'<geom type="cylinder" size="{solid.radius_m}" fromto="{ends}" {look}/>'
+    radius = solid.radius_m * _CYLINDER_GROWN
+    return f'<geom type="cylinder" size="{radius}" fromto="{ends}" {look}/>'
 
 
 def _text(vector: NDArray[np.float64]) -> str:
