@@ -54,8 +54,10 @@ def table(runs: list[PastRun]) -> Table:
     """The list as people read it."""
     out = Table(box=None, pad_edge=False)
     for name in ("date", "target", "radius", "error", "ending", "run directory"):
-        right = name in ("radius", "error")
-        out.add_column(name, justify="right" if right else "left", overflow="fold")
+        right, path = name in ("radius", "error"), name == "run directory"
+        out.add_column(
+            name, justify="right" if right else "left", overflow="fold", no_wrap=not path
+        )
     for run in runs:
         error = figure(run.relative_error, "{:+.3f} %", 100)
         if run.relative_error is None:
