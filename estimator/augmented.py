@@ -30,7 +30,6 @@ FloatArray = NDArray[np.float64]
 
 # So many images are gone through again while what they tell changes.
 _REMEMBERED = 120
-_PASSES = 5
 # Of a standard deviation: what was linearised so far off is linearised anew.
 _TOO_FAR = 0.5
 # A deviation that fell to this share of its prior was found, not assumed.
@@ -171,9 +170,8 @@ class AugmentedKalmanFilter:
         if not motion.covers(first[0].t_s):
             self._first_images = None
             return after, nis
-        for _ in range(_PASSES):
-            if not _far(self._point, after):
-                break
+        # Once an image, for the time it takes: what is then still off is left to the next.
+        if _far(self._point, after):
             self._point = _point_of(after)
             after = self._started(first[0], self._prior_covariance(), motion)
             for again in (*first[1:], image):
