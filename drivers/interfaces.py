@@ -37,6 +37,9 @@ class ArmState:
     # How uncertain ``t_s`` and ``twist_tool`` are, None where nobody knows.
     t_std_s: float | None = None  # standard deviation
     twist_covariance: FloatArray | None = None  # (6, 6)
+    # Spectral density (6, 6) of the twist's error: how fast its integral loses its way. None:
+    # errors of samples are independent, and it is the covariance times the time between samples.
+    twist_spectrum: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)

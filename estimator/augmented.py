@@ -136,7 +136,7 @@ class AugmentedKalmanFilter:
         axis = R @ state.axis
         P = np.ascontiguousarray(state.P[:4, :4])
         x, P = moved(
-            *(state.x[:4].copy(), P, R, d, axis, self._noise_of(motion) * motion.sample_s),
+            *(state.x[:4].copy(), P, R, d, axis, motion.spectrum(self._noise)),
             *(now_s - state.t_s, REST_SIGMA),
         )
         return self._answer(state, now_s, x, P, axis, window.extrapolated_s)
@@ -181,11 +181,7 @@ class AugmentedKalmanFilter:
     def _step(
         self, state: AugmentedState, image: Image, motion: TwistHistory
     ) -> tuple[AugmentedState, float]:
-        noise = self._noise_of(motion)
-        return next_state(state, image, self._point, motion, noise, self._time_std_s)
-
-    def _noise_of(self, motion: TwistHistory) -> FloatArray:
-        return self._noise if motion.covariance is None else motion.covariance
+        return next_state(state, image, self._point, motion, self._noise, self._time_std_s)
 
     def _prior_covariance(self) -> FloatArray:
         """(3, 3) of χ, τ and κ."""

@@ -89,15 +89,16 @@ def next_state(
 ) -> tuple[AugmentedState, float]:
     """The state after the next image, and that image's normalised innovation squared.
 
-    ``noise`` (6, 6) is the covariance of a measured twist, ``time_std_s`` the spread of an image's
-    instant about its stamp less τ.
+    ``noise`` (6, 6) is the covariance of a measured twist where the arm knows none, ``time_std_s``
+    the spread of an image's instant about its stamp less τ.
     """
     t_s, lag_s = _exposed(image, point, motion, state.t_s)
     across = np.eye(3) - np.outer(image.axis, image.axis)
     window = motion.window(state.t_s, t_s)
-    spectrum = noise * motion.sample_s
+    spectrum = motion.spectrum(noise)
     x, P = _moved(state, across, point, window.times_s, window.twists_camera, spectrum)
-    steady = _steady(state.steady, window.twists_camera, noise)
+    known = noise if motion.covariance is None else motion.covariance
+    steady = _steady(state.steady, window.twists_camera, known)
     rate = _rate(x[:3], image.axis, point, steady)
     shown = x[:3] - rate * (x[TAU] - lag_s)
     B = _basis(image.axis)

@@ -26,8 +26,7 @@ def cramer_rao(
     the linear system with Gaussian noise that the targets are, the bound is the Kalman filter's
     variance at the true state. Raises MotionUnknownError where the motion is not known.
     """
-    covariance = np.zeros((6, 6)) if motion.covariance is None else motion.covariance
-    spectrum = covariance * motion.sample_s
+    spectrum = motion.spectrum(np.zeros((6, 6)))
     out = np.empty(len(features))
     P = np.zeros((4, 4))
     for k, feature in enumerate(features):

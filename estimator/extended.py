@@ -107,10 +107,9 @@ class ExtendedKalmanFilter:
         s, chi = integrate(self._model, starts[:, :m], starts[:, m:], times_s, twists)
         ends = np.concatenate((s[:, -1], chi[:, -1]), axis=1)
         F = (ends[1:] - ends[0]).T / steps
-        covariance = self._noise if motion.covariance is None else motion.covariance
         u = twists[-1]
         G = _differences(lambda twist: self._rates(ends[0], twist), u, 1e-3)
-        Q = (t_s - self._t_s) * motion.sample_s * G @ covariance @ G.T
+        Q = (t_s - self._t_s) * G @ motion.spectrum(self._noise) @ G.T
         return ends[0], F @ self._P @ F.T + Q, window.extrapolated_s
 
     def _rates(self, x: FloatArray, u: FloatArray) -> FloatArray:

@@ -166,7 +166,7 @@ class KalmanFilter:
         R, d = displacement(window.times_s, window.twists_camera)
         axis = R @ state.axis
         x, P = moved(
-            *(state.x, state.P, R, d, axis, self._spectrum(motion)),
+            *(state.x, state.P, R, d, axis, motion.spectrum(self._noise)),
             *(now_s - state.t_s, REST_SIGMA),
         )
         return self._answer(state, now_s, x, P, axis, window.extrapolated_s)
@@ -178,7 +178,7 @@ class KalmanFilter:
         window = motion.window(state.t_s, t_s)
         R, d = displacement(window.times_s, window.twists_camera)
         x, P = moved(
-            *(state.x, state.P, R, d, axis, self._spectrum(motion)),
+            *(state.x, state.P, R, d, axis, motion.spectrum(self._noise)),
             *(t_s - state.t_s, REST_SIGMA),
         )
         return x, P, window.twists_camera[-1]
@@ -189,10 +189,6 @@ class KalmanFilter:
         s_dot = np.cross(x[:3], omega) - x[3] * (v - axis * float(axis @ v))
         spread = self._time_std_s * s_dot
         return np.outer(spread, spread)
-
-    def _spectrum(self, motion: TwistHistory) -> FloatArray:
-        covariance = self._noise if motion.covariance is None else motion.covariance
-        return covariance * motion.sample_s
 
     def _first(self, t_s: float, s: FloatArray, axis: FloatArray, covariance: FloatArray) -> _State:
         x = np.append(s, self._prior.chi)

@@ -53,6 +53,8 @@ class TwistHistory:
         self._end = 0
         # Covariance (6, 6) of a recorded twist; None: nobody said how uncertain they are.
         self.covariance: FloatArray | None = None
+        # Spectral density (6, 6) of its error; None: that of independent samples.
+        self.density: FloatArray | None = None
         # Compiles the kernel now rather than in the middle of a run.
         _cut(np.zeros(1), np.zeros((1, 6)), 0, 1, 0.0, 0.0)
 
@@ -75,6 +77,14 @@ class TwistHistory:
     def sample_s(self) -> float:
         """The mean time from one kept sample to the next; 0 for fewer than two."""
         return (self.end_s - self.start_s) / (len(self) - 1) if len(self) > 1 else 0.0
+
+    def spectrum(self, unknown: FloatArray) -> FloatArray:
+        """Spectral density (6, 6) of the twist's error: times a duration, the covariance of the
+        motion integrated over it. ``unknown`` (6, 6) is a twist's covariance where nobody said."""
+        if self.density is not None:
+            return self.density
+        covariance = unknown if self.covariance is None else self.covariance
+        return covariance * self.sample_s
 
     def append(self, t_s: float, twist_camera: ArrayLike) -> None:
         """Record one twist (6,); raises ValueError unless ``t_s`` is later than all before."""

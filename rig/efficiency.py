@@ -6,6 +6,7 @@ from estimator.bound import cramer_rao
 from estimator.kalman import TwistNoise
 from estimator.twist_history import MotionUnknownError, TwistHistory
 from rig.config import EstimatorConfig
+from rig.frames import uncertainty_at_camera
 from rig.run_data import RunData
 
 
@@ -20,11 +21,11 @@ def radius_bound_m(data: RunData, config: EstimatorConfig, radius_m: float) -> f
         return None
     motion = TwistHistory(span_s=float(arm.t_s[-1] - arm.t_s[0]) + 1.0)
     motion.extend(arm.t_s, arm.twist_camera)
-    reported = data.arm_states[-1].twist_covariance
-    if reported is None:
+    motion.covariance, motion.density = uncertainty_at_camera(
+        data.arm_states[-1], data.camera_from_tool
+    )
+    if motion.covariance is None:
         motion.covariance = TwistNoise(config.twist_std_m_s, config.twist_std_rad_s).covariance
-    else:
-        motion.covariance = data.camera_from_tool @ reported @ data.camera_from_tool.T
     times_s = np.array([update.t_s for update in data.updates])
     try:
         chi_std = cramer_rao(times_s, data.features, 1.0 / radius_m, motion)[-1]

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.interfaces import ArmState
+
 FloatArray = NDArray[np.float64]
 
 
@@ -28,3 +30,17 @@ def invert(T_a_b: FloatArray) -> FloatArray:
     out[:3, :3] = R.T
     out[:3, 3] = -R.T @ p
     return out
+
+
+def uncertainty_at_camera(
+    state: ArmState, camera_from_tool: FloatArray
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Covariance and spectral density (6, 6) of the camera's twist, None where the arm knows none.
+
+    ``camera_from_tool`` (6, 6) maps the tool's twist to the camera's.
+    """
+    covariance, spectrum = (
+        None if known is None else camera_from_tool @ known @ camera_from_tool.T
+        for known in (state.twist_covariance, state.twist_spectrum)
+    )
+    return covariance, spectrum

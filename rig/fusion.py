@@ -12,6 +12,7 @@ from drivers.errors import OperateError, SafetyError
 from drivers.interfaces import ArmState, Frame
 from estimator.estimate import Correction, Estimate, Estimator
 from estimator.twist_history import MotionUnknownError, TwistHistory
+from rig.frames import uncertainty_at_camera
 from rig.rolling_shutter import RollingShutter
 from rig.run_data import RunData, Snapshot
 from rig.vision import Sighting
@@ -163,7 +164,9 @@ class Fusion:
         reported = state.twist_covariance
         if reported is not None and reported is not self._twist_covariance:
             self._twist_covariance = reported
-            self._motion.covariance = self._camera_from_tool @ reported @ self._camera_from_tool.T
+            self._motion.covariance, self._motion.density = uncertainty_at_camera(
+                state, self._camera_from_tool
+            )
 
     def _covered(self, t_s: float) -> bool:
         return self.state is not None and self.state.t_s >= t_s

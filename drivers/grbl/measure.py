@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.grbl.kinematics import GantryKinematics
-from drivers.grbl.timing import rate_std
+from drivers.grbl.timing import rate_spectrum, rate_std
 from drivers.interfaces import ArmState
 
 FloatArray = NDArray[np.float64]
@@ -71,24 +71,27 @@ class MotionMeter:
         slope = offsets @ positions / float(offsets @ offsets)
         q = self._kinematics.joints(np.mean(positions, axis=0))
         qd = self._kinematics.joint_rates_of(slope)
+        covariance, spectrum = self._uncertainty(q, slope, middle_s, float(times[-1] - times[0]))
         state = ArmState(
             t_s=middle_s,
             T_base_tool=self._kinematics.tool_pose(q),
             twist_tool=self._kinematics.tool_twist(q, qd),
             t_std_s=self._stamp_std_s / math.sqrt(len(times)),
-            twist_covariance=self._covariance(q, slope, middle_s, float(times[-1] - times[0])),
+            twist_covariance=covariance,
+            twist_spectrum=spectrum,
         )
         self._last_s, self._last_slope = middle_s, slope
         return state
 
-    def _covariance(
+    def _uncertainty(
         self, q: FloatArray, slope: FloatArray, middle_s: float, window_s: float
-    ) -> FloatArray:
-        """Of the tool's twist (6, 6), the axes' errors taken as independent."""
+    ) -> tuple[FloatArray, FloatArray]:
+        """Covariance and spectrum of the tool's twist (6, 6), the axes' errors independent."""
         change = np.zeros_like(slope)
         if self._last_slope is not None:
             change = (slope - self._last_slope) / (middle_s - self._last_s)
-        axes = rate_std(self._step, slope, change, self._stamp_std_s, window_s)
-        spread = self._kinematics.tool_jacobian(q) * self._kinematics.joint_rates_of(axes)
-        covariance: FloatArray = spread @ spread.T
-        return covariance
+        std = rate_std(self._step, slope, change, self._stamp_std_s, window_s)
+        density = rate_spectrum(self._step, slope, change, self._stamp_std_s, window_s)
+        J, joints = self._kinematics.tool_jacobian(q), self._kinematics.joint_rates_of
+        spread, drift = J * joints(std), J * joints(np.sqrt(density))
+        return spread @ spread.T, drift @ drift.T

@@ -69,6 +69,26 @@ def rate_std(
     return std
 
 
+def rate_spectrum(
+    step: FloatArray,
+    rate: FloatArray,
+    acceleration: FloatArray,
+    stamp_std_s: float,
+    window_s: float,
+) -> FloatArray:
+    """Spectral densities of such rates' errors, elementwise, in the units of ``step`` squared, / s.
+
+    What a rate is wrong by inside a window is made up for in the next: integrated, rates are the
+    positions again, wrong at both ends by steps, stamps and what a mean over the window cuts off
+    a bend. As a random walk that is as wrong over one window it is too wide for long stretches,
+    and about right from image to image.
+    """
+    bend = acceleration * window_s**2 / 24.0
+    end2 = step**2 / 12.0 + (rate * stamp_std_s) ** 2 + bend**2
+    density: FloatArray = 2.0 * end2 / window_s
+    return density
+
+
 def stamp_std_s(controller: Controller) -> float:
     """Standard deviation of a report's instant, from the round trips measured at start-up.
 

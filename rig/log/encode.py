@@ -95,6 +95,8 @@ class Encoder:
             covariance = state.twist_covariance
             if covariance is not None and covariance is not self._twist_covariance:
                 known["twist_covariance"] = covariance.tolist()
+                if state.twist_spectrum is not None:
+                    known["twist_spectrum"] = state.twist_spectrum.tolist()
                 self._twist_covariance = covariance
             yield self._json(
                 "arm",

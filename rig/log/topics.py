@@ -85,6 +85,7 @@ TOPICS = (
             twist_tool={**_array(6), "description": "measured, m/s and rad/s, tool axes"},
             t_std_s=_NUMBER,
             twist_covariance=_array(6, 6),
+            twist_spectrum={**_array(6, 6), "description": "density of its error, m2/s and rad2/s"},
         ),
     ),
     Topic(

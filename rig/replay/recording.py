@@ -129,15 +129,19 @@ class _Arm:
     def __init__(self) -> None:
         self._t_std_s: float | None = None
         self._twist_covariance: FloatArray | None = None
+        self._twist_spectrum: FloatArray | None = None
 
     def state(self, values: dict[str, Any]) -> ArmState:
         self._t_std_s = values.get("t_std_s", self._t_std_s)
         if "twist_covariance" in values:
             self._twist_covariance = np.array(values["twist_covariance"])
+        if "twist_spectrum" in values:
+            self._twist_spectrum = np.array(values["twist_spectrum"])
         pose = np.eye(4)
         pose[:3] = values["T_base_tool"]
         twist = np.array(values["twist_tool"])
-        return ArmState(values["t_s"], pose, twist, self._t_std_s, self._twist_covariance)
+        known = self._t_std_s, self._twist_covariance, self._twist_spectrum
+        return ArmState(values["t_s"], pose, twist, *known)
 
 
 def open_recording(path: Path) -> Recording:

@@ -2,11 +2,17 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from drivers.grbl.selftest import measure_delay
 from drivers.grbl.session import Session
+from estimator.displacement import displacement
+from estimator.twist_history import TwistHistory
 from sim_backend.loopback_grbl.machine import Machine
 from tests.drivers.grbl.simulated import Gantry
+
+FloatArray = NDArray[np.float64]
 
 UART = Machine(clock_rate=1.0)
 USB = Machine(clock_rate=1.0, baud=1_000_000)
@@ -113,6 +119,37 @@ def test_each_state_states_an_uncertainty_that_covers_its_error_also_while_accel
     assert np.percentile(scores, 68.0) < 1.5
     assert np.percentile(scores, 95.0) < 3.0
     assert all(0.0 < state.t_std_s < 0.01 for state in gantry.states)
+
+
+@pytest.mark.parametrize("machine", [UART, USB])
+def test_the_stated_spectrum_tells_how_far_integrated_twists_lose_the_way(machine: Machine) -> None:
+    gantry = Gantry(machine)
+    gantry.drive(np.abs(MIXED), 0.5)
+    gantry.states.clear()
+    for k in range(60):
+        turned = np.array([np.cos(0.05 * k), np.sin(0.05 * k), 0.3, 1.0, np.cos(0.1 * k), 1.0])
+        gantry.drive(np.abs(MIXED) * turned, 0.05)
+    history = TwistHistory()
+    twists = [state.twist_tool for state in gantry.states]
+    history.extend([state.t_s for state in gantry.states], twists)
+    spectrum = np.mean([state.twist_spectrum for state in gantry.states], axis=0)
+
+    def pose(t_s: float) -> FloatArray:
+        return gantry.kinematics.tool_pose(gantry.firmware.history.at(t_s)[0][: machine.axes])
+
+    def off(t_s: float, duration_s: float) -> FloatArray:
+        window = history.window(t_s, t_s + duration_s)
+        R, d = displacement(window.times_s, window.twists_camera)
+        T, after = pose(t_s), pose(t_s + duration_s)
+        moved = after[:3, :3].T @ (after[:3, 3] - T[:3, 3])
+        turned = R @ T[:3, :3].T @ after[:3, :3]
+        return np.concatenate([d - moved, Rotation.from_matrix(turned).as_rotvec()])
+
+    for duration_s, least, most in ((1.0 / 30.0, 0.4, 1.7), (1.0, 0.1, 1.0)):
+        starts = np.arange(history.start_s + 0.1, history.end_s - duration_s - 0.1, 0.021)
+        errors = np.array([off(t_s, duration_s) for t_s in starts])
+        scores = errors.std(axis=0) / np.sqrt(duration_s * np.diag(spectrum))
+        assert np.all((least < scores) & (scores < most)), scores
 
 
 def test_states_come_at_fifty_hertz_and_none_is_older_than_the_timing_says() -> None:
