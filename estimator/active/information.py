@@ -9,6 +9,8 @@ FloatArray = NDArray[np.float64]
 
 # Added to the images' covariance, as a share of s: keeps what is inverted regular.
 _LEAST_SHARE = 1e-9
+# Directions across a line of sight.
+_AROUND = 16
 
 
 def variance_decrease(
@@ -35,6 +37,18 @@ def displacements(directions: FloatArray, distance_m: float, axis: FloatArray | 
     """The useful displacements (n, 3) of travelling ``distance_m`` along each unit direction."""
     shifts: FloatArray = useful_velocity(distance_m * directions, axis)
     return shifts
+
+
+def directions_across(s: FloatArray, axis: FloatArray | None) -> FloatArray:
+    """Unit vectors (n, 3) across the line of sight to s, and across a cylinder's axis too."""
+    first = np.cross(s, axis if axis is not None else np.eye(3)[int(np.argmin(np.abs(s)))])
+    first = first / np.linalg.norm(first)
+    if axis is not None:
+        return np.array([first, -first])
+    second = np.cross(s, first) / np.linalg.norm(s)
+    angle = 2.0 * np.pi * np.arange(_AROUND)[:, None] / _AROUND
+    around: FloatArray = np.cos(angle) * first + np.sin(angle) * second
+    return around
 
 
 def sphere_directions(count: int) -> FloatArray:

@@ -6,7 +6,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimator.active.information import displacements, sphere_directions, variance_decrease
+from estimator.active.information import (
+    directions_across,
+    displacements,
+    sphere_directions,
+    variance_decrease,
+)
 from estimator.active.room import BRAKING_SHARE, BoolArray, Walls, room_for
 from estimator.estimate import Estimate
 
@@ -17,6 +22,9 @@ _HORIZON_S = 0.5
 # Another direction has to leave less than this share of the variance that going on leaves.
 _WORTH_TURNING = 0.7
 _TURN_RAD_S = 3.0
+# Directions that leave no more than so many times the least variance are as good as the best.
+_AS_GOOD = 1.05
+_TURNING_LESS = 0.1
 
 
 class InformationPolicy:
@@ -24,8 +32,9 @@ class InformationPolicy:
 
     The candidates are directions all around. Those are left out that would bring the camera
     closer to the target's surface than ``least_distance_m`` or farther than
-    ``most_distance_m``, or past one of ``walls()``. The first choice is free, later ones turn v
-    at a bounded rate and have to be worth it. Without a covariance v stays ``v0`` (3,).
+    ``most_distance_m``, or past one of ``walls()``. The first choice is free, and takes the
+    easiest of those as good as the best; later ones turn v at a bounded rate and have to be
+    worth it. Without a covariance v stays ``v0`` (3,).
     Raises ValueError for a v0 that is zero.
     """
 
@@ -58,7 +67,9 @@ class InformationPolicy:
             return
         # Going on as now is the first candidate.
         going = (self._wanted if self._chosen else self._v / self._speed_m_s)[None]
-        directions = np.concatenate((going, self._directions))
+        directions = np.concatenate(
+            (going, self._directions, directions_across(estimate.s, estimate.axis))
+        )
         way_m = self._speed_m_s * _HORIZON_S
         left = float(estimate.covariance[3, 3]) - variance_decrease(
             estimate.covariance,
@@ -69,10 +80,14 @@ class InformationPolicy:
         best = int(np.argmin(left))
         if not math.isfinite(left[best]):
             return  # nowhere to go: what limits the motion decides
-        if not self._chosen or left[best] < _WORTH_TURNING * left[0]:
-            self._wanted = directions[best]
         if not self._chosen:
+            hard = np.where(
+                left <= _AS_GOOD * left[best], _hardness(directions, estimate.s), math.inf
+            )
+            self._wanted = directions[int(np.argmin(hard))]
             self._v, self._chosen = self._speed_m_s * self._wanted, True
+        elif left[best] < _WORTH_TURNING * left[0]:
+            self._wanted = directions[best]
 
     def advance(self, axis: FloatArray | None, omega: FloatArray, dt_s: float) -> None:
         """Turn v towards the chosen direction for ``dt_s``."""
@@ -101,3 +116,15 @@ class InformationPolicy:
             free &= (then_m >= self._least_m) | (then_m > now_m)
             free &= (then_m <= self._most_m) | (then_m < now_m)
         return free
+
+
+def _hardness(directions: FloatArray, s: FloatArray) -> FloatArray:
+    """What speaks against each of the directions (n, 3) while the target at s is being centred.
+
+    As long as the image moves along s_x, s_y an image's uncertain instant makes it uncertain
+    that way: across it tells more. Where that cannot be, rather towards the target's place than
+    away from it: the camera turns less, which leaves more of the arm's acceleration for v.
+    """
+    towards = directions[:, :2] @ s[:2]
+    hardness: FloatArray = np.abs(towards) - _TURNING_LESS * towards
+    return hardness

@@ -5,7 +5,11 @@ import pytest
 from numpy.typing import NDArray
 
 from estimator.active.circle import CircularVelocity
-from estimator.active.information import sphere_directions, variance_decrease
+from estimator.active.information import (
+    directions_across,
+    sphere_directions,
+    variance_decrease,
+)
 from estimator.active.information_policy import InformationPolicy
 from estimator.estimate import Estimate
 from estimator.kalman_step import moved, seen
@@ -54,6 +58,34 @@ def test_directions_are_spread_evenly() -> None:
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
     assert np.abs(directions.mean(axis=0)).max() < 0.02
     assert (directions @ directions.T - 2.0 * np.eye(60)).max() < np.cos(0.3)
+
+
+@pytest.mark.parametrize("axis", [None, AXIS])
+def test_directions_across_are_across_sight_and_axis(axis: FloatArray | None) -> None:
+    directions = directions_across(S, axis)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
+    np.testing.assert_allclose(directions @ S, 0.0, atol=1e-12)
+    np.testing.assert_allclose(directions.sum(axis=0), 0.0, atol=1e-12)
+    if axis is None:
+        assert len(directions) > 8
+    else:
+        np.testing.assert_allclose(directions @ axis, 0.0, atol=1e-12)
+
+
+def test_of_ways_as_good_the_first_is_across_that_of_centring() -> None:
+    # Images of a target that moves in the image are uncertain that way, as their instants are.
+    beside = np.array([1.5, -1.0, 14.0])
+    policy = InformationPolicy([0.0, 0.0, SPEED], NEAR_M)
+    policy.inform(estimate(s=beside))
+    assert abs(policy.v[:2] @ beside[:2]) < 0.15 * SPEED * np.hypot(*beside[:2])
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_on_a_cylinder_the_first_way_is_the_one_with_the_lesser_turn(sign: float) -> None:
+    beside = sign * np.array([0.8, -0.6, 0.0]) + [0.0, 0.0, 14.0]
+    policy = InformationPolicy([0.0, 0.0, SPEED], NEAR_M)
+    policy.inform(estimate(axis=AXIS, s=beside))
+    assert policy.v[:2] @ beside[:2] > 0.9 * SPEED
 
 
 @pytest.mark.parametrize("v0", [[0.0, 0.0, SPEED], [0.0, 0.0, -SPEED], [SPEED, 0.0, 0.0]])
