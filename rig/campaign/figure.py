@@ -1,6 +1,7 @@
-"""A campaign in one figure: how errors fall, and how long it takes to stay within 1 %."""
+"""A campaign in one figure: who is fastest, by how much, how exact, and whether intervals hold."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -10,10 +11,16 @@ matplotlib.use("Agg")  # a file, on machines without a screen too
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
+from scipy.stats import binom
 
-from rig.campaign.worker import GRID_S, Row
+from rig.campaign.table import Line, lines_of
+from rig.campaign.worker import Row
 
-_LINES = {"constant": "-", "paper": "--", "information": "-.", "circle": ":", "servo": (0, (1, 3))}
+FloatArray = NDArray[np.float64]
+
+# Of estimators, or of motions where there is but one estimator.
 _COLOURS = {
     "observer": "#1f5fa8",
     "kalman": "#c62828",
@@ -21,67 +28,180 @@ _COLOURS = {
     "triangulation": "#8a6d00",
     "limb_plane": "#6a3d9a",
     "limb_plane_ekf": "#e0771b",
+    "information": "#c62828",
+    "circle": "#1f5fa8",
+    "paper": "#2e7d32",
+    "constant": "#8a6d00",
+    "servo": "#6a3d9a",
 }
+_WIDTH_INCH, _ROW_INCH, _REST_INCH, _DPI = 11.5, 0.27, 1.5, 90
+_GAP_ROWS = 1.9  # between blocks, for their titles
+_TITLE_ROWS = 0.95  # above a block's first row
+_SPREAD_ROWS = 0.5  # of a row's dots
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A line of the table at its height in the figure."""
+
+    y: float
+    line: Line
+    colour: str
+    times_s: FloatArray  # of the runs that stayed within 1 %
+    faster: float | None  # than the slowest of its block
 
 
 def draw_campaign(path: Path, target: str, rows: Sequence[Row]) -> None:
-    """Draw a column of panels per start and condition into ``path`` (PNG)."""
-    names = list(dict.fromkeys((str(row["start"]), str(row["noise"])) for row in rows))
-    figure, axes = plt.subplots(
-        2,
-        len(names),
-        figsize=(max(7.0, 5.2 * len(names)), 8.4),
-        squeeze=False,
+    """Draw a block per start and condition, the fastest on top, into ``path`` (PNG)."""
+    blocks = _blocks(rows)
+    places = [place for block in blocks.values() for place in block]
+    figure, panels = plt.subplots(
+        1,
+        3,
+        figsize=(_WIDTH_INCH, _ROW_INCH * (places[-1].y + 1.0) + _REST_INCH),
+        sharey=True,
         layout="constrained",
+        gridspec_kw={"width_ratios": (2.0, 1.0, 1.0), "wspace": 0.06},
     )
-    figure.suptitle(f"{target}: estimators and camera motions")
-    for column, (start, noise) in enumerate(names):
-        these = [
-            row for row in rows if (row["start"], row["noise"]) == (start, noise) and row["course"]
-        ]
-        _courses(axes[0, column], noise if start == "default" else f"{start}, {noise}", these)
-        _times(axes[1, column], these)
-    axes[0, 0].legend(fontsize=8)
-    figure.savefig(path, dpi=90)
+    runs = max(place.line.runs for place in places)
+    figure.suptitle(f"{target}: {runs} simulated runs of each, the fastest on top")
+    draws = (_draw_times, _draw_errors, _draw_intervals)
+    for axes, draw in zip(panels, draws, strict=True):
+        draw(axes, places)
+        axes.grid(axis="x", color="0.9", linewidth=0.7)
+        axes.set_axisbelow(True)
+        axes.tick_params(axis="y", length=0)
+        axes.spines[["top", "right", "left"]].set_visible(False)
+    _name_rows(panels[0], blocks)
+    figure.savefig(path, dpi=_DPI)
     plt.close(figure)
 
 
-def _courses(axes: Axes, title: str, rows: Sequence[Row]) -> None:
-    """The median of |error| over time."""
-    for name, group in _groups(rows).items():
-        courses = [row["course"] for row in group]
-        longest = max(len(course) for course in courses if isinstance(course, list))
-        grid = np.full((len(courses), longest), np.nan)
-        for k, course in enumerate(courses):
-            assert isinstance(course, list)
-            grid[k, : len(course)] = course
-        median = 100.0 * np.nanmedian(grid, axis=0)
-        policy, estimator = name
-        axes.semilogy(
-            GRID_S[:longest],
-            median,
-            _LINES[policy],
-            color=_COLOURS[estimator],
-            label=f"{estimator}, {policy}",
+def _blocks(rows: Sequence[Row]) -> dict[str, list[_Place]]:
+    """The lines of each start and condition, the fastest first, with their heights."""
+    lines = lines_of(rows)
+    one_estimator = len({line.estimator for line in lines}) == 1
+    out: dict[str, list[_Place]] = {}
+    y = 0.0
+    for start, noise in dict.fromkeys((line.start, line.noise) for line in lines):
+        block = [line for line in lines if (line.start, line.noise) == (start, noise)]
+        times_s = {id(line): _times_s(rows, line) for line in block}
+        block.sort(key=lambda line: _slowness(line, times_s[id(line)]))
+        medians = [line.time_to_1pct_s for line in block if line.time_to_1pct_s]
+        places = []
+        for line in block:
+            colour = _COLOURS[line.policy if one_estimator else line.estimator]
+            faster = max(medians) / line.time_to_1pct_s if line.time_to_1pct_s else None
+            places.append(_Place(y, line, colour, times_s[id(line)], faster))
+            y += 1.0
+        out[f"start: {start}, images: {noise}"] = places
+        y += _GAP_ROWS
+    return out
+
+
+def _slowness(line: Line, times_s: FloatArray) -> tuple[float, float, float]:
+    """What lines are ordered by: the median, those that never stayed within, the mean."""
+    median_s = np.inf if line.time_to_1pct_s is None else line.time_to_1pct_s
+    mean_s = float(times_s.mean()) if times_s.size else np.inf
+    return median_s, line.runs - times_s.size, mean_s
+
+
+def _times_s(rows: Sequence[Row], line: Line) -> FloatArray:
+    group = (line.start, line.noise, line.policy, line.estimator)
+    return np.array(
+        [
+            row["time_to_1pct_s"]
+            for row in rows
+            if (row["start"], row["noise"], row["policy"], row["estimator"]) == group
+            and row["time_to_1pct_s"] is not None
+        ],
+        dtype=float,
+    )
+
+
+def _name_rows(axes: Axes, blocks: dict[str, list[_Place]]) -> None:
+    places = [place for block in blocks.values() for place in block]
+    names = [f"{place.line.estimator}, {place.line.policy}" for place in places]
+    axes.set_yticks([place.y for place in places], names)
+    for label, place in zip(axes.get_yticklabels(), places, strict=True):
+        label.set_color(place.colour)
+    axes.set_ylim(places[-1].y + 0.8, -1.5)
+    for title, block in blocks.items():
+        axes.text(
+            *(0.0, block[0].y - _TITLE_ROWS, title),
+            transform=axes.get_yaxis_transform(),
+            fontweight="bold",
+            va="center",
         )
-    axes.axhline(1.0, color="grey", linewidth=0.7)
-    axes.set(title=title, xlabel="t [s]", ylabel="median |error of R| [%]", ylim=(1e-3, 200))
 
 
-def _times(axes: Axes, rows: Sequence[Row]) -> None:
-    """Time to stay within 1 %, every run a dot."""
-    groups = _groups(rows)
-    for k, ((policy, estimator), group) in enumerate(groups.items()):
-        times = [row["time_to_1pct_s"] for row in group if row["time_to_1pct_s"] is not None]
-        spread = np.linspace(-0.25, 0.25, len(times)) if len(times) > 1 else np.zeros(len(times))
-        axes.semilogy(k + spread, times, ".", color=_COLOURS[estimator], markersize=4)
-        del policy
-    axes.set_xticks(range(len(groups)), [f"{e}\n{p}" for p, e in groups], fontsize=7)
-    axes.set(ylabel="time to stay within ± 1 % [s]")
+def _draw_times(axes: Axes, places: Sequence[_Place]) -> None:
+    """Every run a dot, the median a bar, and in words what it comes to."""
+    _log_scale(axes, 2.0, 5.0)
+    for place in places:
+        spread = np.linspace(-0.5, 0.5, len(place.times_s)) * _SPREAD_ROWS
+        axes.plot(
+            place.times_s, place.y + spread, ".", color=place.colour, alpha=0.35, markersize=4
+        )
+        _bar(axes, place.line.time_to_1pct_s, place.y, place.colour, 3.0)
+        axes.text(
+            *(1.01, place.y, _verdict(place)),
+            transform=axes.get_yaxis_transform(),
+            va="center",
+            fontsize=9,
+        )
+    axes.set_xlabel(
+        "time until R stays within ± 1 % [s]\nruns, | their median, × faster than the slowest"
+    )
 
 
-def _groups(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
-    out: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        out.setdefault((str(row["policy"]), str(row["estimator"])), []).append(row)
-    return dict(sorted(out.items(), key=lambda item: (item[0][1], item[0][0])))
+def _verdict(place: _Place) -> str:
+    """The median, how much faster that is than the slowest, and the runs that never got there."""
+    line, never = place.line, place.line.runs - len(place.times_s)
+    words = [] if line.time_to_1pct_s is None else [f"{line.time_to_1pct_s:.2f} s"]
+    if place.faster is not None and place.faster >= 1.05:
+        words.append(f"×{place.faster:.{0 if place.faster >= 9.5 else 1}f}")
+    if never:
+        words.append("never" if never == line.runs else f"{never} never")
+    return "  ".join(words)
+
+
+def _draw_errors(axes: Axes, places: Sequence[_Place]) -> None:
+    """The rms error at the end, and the bound that no estimator can pass."""
+    _log_scale(axes)
+    for place in places:
+        rms, efficiency = place.line.rms_error, place.line.efficiency
+        if rms:
+            axes.plot(100.0 * rms, place.y, "o", color=place.colour)
+        if rms and efficiency:
+            _bar(axes, 100.0 * rms / efficiency, place.y, "black", 1.5)
+    axes.set_xlabel("rms error at the end [%]\n| Cramér-Rao bound")
+
+
+def _draw_intervals(axes: Axes, places: Sequence[_Place]) -> None:
+    """How often the truth was inside, beside what chance makes of 95 %."""
+    for place in places:
+        line, found = place.line, place.line.runs - place.line.failed
+        if line.covered is None:
+            axes.text(0.5, place.y, "no interval", color="0.5", va="center", ha="center")
+            continue
+        low, high = (float(binom.ppf(p, found, 0.95)) / found for p in (0.025, 0.975))
+        axes.barh(place.y, high - low, left=low, height=0.8, color="#cfe8cf")
+        honest = low <= line.covered <= high
+        axes.plot(line.covered, place.y, "o" if honest else "X", color=place.colour)
+    axes.set_xlim(-0.03, 1.05)
+    axes.set_xticks([0.0, 0.5, 0.95], ["0", "50", "95"])
+    axes.set_xlabel("truth in the 95 % interval [%]\ngreen: chance, X: not honest")
+
+
+def _bar(axes: Axes, x: float | None, y: float, colour: str, width: float) -> None:
+    if x is not None:
+        axes.plot([x, x], [y - 0.36, y + 0.36], color=colour, linewidth=width)
+
+
+def _log_scale(axes: Axes, *marked: float) -> None:
+    """Logarithmic, each decade marked at 1 and at ``marked``, in plain figures."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, *marked)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
