@@ -94,7 +94,7 @@ def _blocks(rows: Sequence[Row]) -> dict[str, list[_Place]]:
             faster = max(medians) / line.time_to_1pct_s if line.time_to_1pct_s else None
             places.append(_Place(y, line, colour, times_s[id(line)], faster))
             y += 1.0
-        out[f"start: {start}, images: {noise}"] = places
+        out[f"start: {start}, condition: {noise}"] = places
         y += _GAP_ROWS
     return out
 
@@ -151,7 +151,7 @@ def _draw_times(axes: Axes, places: Sequence[_Place]) -> None:
             fontsize=9,
         )
     axes.set_xlabel(
-        "time until R stays within ± 1 % [s]\nruns, | their median, × faster than the slowest"
+        "time until R stays within ± 1 % [s]\n· a run   | their median   × faster than the slowest"
     )
 
 
@@ -175,7 +175,7 @@ def _draw_errors(axes: Axes, places: Sequence[_Place]) -> None:
             axes.plot(100.0 * rms, place.y, "o", color=place.colour)
         if rms and efficiency:
             _bar(axes, 100.0 * rms / efficiency, place.y, "black", 1.5)
-    axes.set_xlabel("rms error at the end [%]\n| Cramér-Rao bound")
+    axes.set_xlabel("rms error at the end [%]\n● reached   | Cramér-Rao bound")
 
 
 def _draw_intervals(axes: Axes, places: Sequence[_Place]) -> None:
@@ -191,7 +191,7 @@ def _draw_intervals(axes: Axes, places: Sequence[_Place]) -> None:
         axes.plot(line.covered, place.y, "o" if honest else "X", color=place.colour)
     axes.set_xlim(-0.03, 1.05)
     axes.set_xticks([0.0, 0.5, 0.95], ["0", "50", "95"])
-    axes.set_xlabel("truth in the 95 % interval [%]\ngreen: chance, X: not honest")
+    axes.set_xlabel("truth in the 95 % interval [%]\ngreen: as it says   X: not")
 
 
 def _bar(axes: Axes, x: float | None, y: float, colour: str, width: float) -> None:
