@@ -1,5 +1,7 @@
 """Which way to move so that the radius becomes known soonest: the value of a displacement."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,8 +11,8 @@ FloatArray = NDArray[np.float64]
 
 # Added to the images' covariance, as a share of s: keeps what is inverted regular.
 _LEAST_SHARE = 1e-9
-# Directions across a line of sight.
-_AROUND = 16
+# Directions across a line of sight, and the share of s beside the optical axis that counts.
+_AROUND, _ASIDE = 16, 1e-6
 
 
 def variance_decrease(
@@ -40,14 +42,19 @@ def displacements(directions: FloatArray, distance_m: float, axis: FloatArray | 
 
 
 def directions_across(s: FloatArray, axis: FloatArray | None) -> FloatArray:
-    """Unit vectors (n, 3) across the line of sight to s, and across a cylinder's axis too."""
-    first = np.cross(s, axis if axis is not None else np.eye(3)[int(np.argmin(np.abs(s)))])
-    first = first / np.linalg.norm(first)
-    if axis is not None:
-        return np.array([first, -first])
-    second = np.cross(s, first) / np.linalg.norm(s)
-    angle = 2.0 * np.pi * np.arange(_AROUND)[:, None] / _AROUND
-    around: FloatArray = np.cos(angle) * first + np.sin(angle) * second
+    """Unit vectors (n, 3) across the line of sight to s, and across a cylinder's axis too.
+
+    Without an axis they are all around, two of them across the optical axis.
+    """
+    if axis is None:
+        axis = np.eye(3)[2 if math.hypot(s[0], s[1]) > _ASIDE * abs(s[2]) else 0]
+        steps = np.arange(_AROUND) * (2.0 * math.pi / _AROUND)
+    else:
+        steps = np.array([0.0, math.pi])
+    first = np.cross(s, axis)
+    first = first / math.sqrt(float(first @ first))
+    second = np.cross(s, first) / math.sqrt(float(s @ s))
+    around: FloatArray = np.cos(steps)[:, None] * first + np.sin(steps)[:, None] * second
     return around
 
 

@@ -24,7 +24,8 @@ _WORTH_TURNING = 0.7
 _TURN_RAD_S = 3.0
 # Directions that leave no more than so many times the least variance are as good as the best.
 _AS_GOOD = 1.05
-_TURNING_LESS = 0.1
+# How little the turn and the direction of before count in choosing among them.
+_TURNING_LESS, _LIKENESS = 0.1, 0.01
 
 
 class InformationPolicy:
@@ -81,10 +82,9 @@ class InformationPolicy:
         if not math.isfinite(left[best]):
             return  # nowhere to go: what limits the motion decides
         if not self._chosen:
-            hard = np.where(
-                left <= _AS_GOOD * left[best], _hardness(directions, estimate.s), math.inf
-            )
-            self._wanted = directions[int(np.argmin(hard))]
+            hardness = _hardness(directions, estimate.s, going[0])
+            good = left <= _AS_GOOD * left[best]
+            self._wanted = directions[int(np.argmin(np.where(good, hardness, math.inf)))]
             self._v, self._chosen = self._speed_m_s * self._wanted, True
         elif left[best] < _WORTH_TURNING * left[0]:
             self._wanted = directions[best]
@@ -118,13 +118,15 @@ class InformationPolicy:
         return free
 
 
-def _hardness(directions: FloatArray, s: FloatArray) -> FloatArray:
+def _hardness(directions: FloatArray, s: FloatArray, going: FloatArray) -> FloatArray:
     """What speaks against each of the directions (n, 3) while the target at s is being centred.
 
     As long as the image moves along s_x, s_y an image's uncertain instant makes it uncertain
     that way: across it tells more. Where that cannot be, rather towards the target's place than
-    away from it: the camera turns less, which leaves more of the arm's acceleration for v.
+    away from it: the camera turns less, which leaves more of the arm's acceleration for v. Of
+    two that are alike the one nearer to ``going`` (3,) is taken.
     """
     towards = directions[:, :2] @ s[:2]
-    hardness: FloatArray = np.abs(towards) - _TURNING_LESS * towards
+    likeness = math.hypot(s[0], s[1]) * (directions @ going)
+    hardness: FloatArray = np.abs(towards) - _TURNING_LESS * towards - _LIKENESS * likeness
     return hardness
