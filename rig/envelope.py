@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from drivers.interfaces import ArmState, Joints
 from estimator.estimate import Estimate
 from estimator.image.intrinsics import Intrinsics
+from estimator.vectors import cross
 from rig.config_safety import SafetyConfig
 from rig.field_of_view import border_planes, room_in_view
 from rig.frames import invert, twist_map
-from rig.vectors import cross
 
 FloatArray = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.image.intrinsics import Intrinsics
-from rig.vectors import cross
+from estimator.vectors import cross
 
 FloatArray = NDArray[np.float64]
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.active.sigma2 import useful_velocity
+from estimator.vectors import cross
 
 FloatArray = NDArray[np.float64]
 
@@ -51,9 +52,9 @@ def directions_across(s: FloatArray, axis: FloatArray | None) -> FloatArray:
         steps = np.arange(_AROUND) * (2.0 * math.pi / _AROUND)
     else:
         steps = np.array([0.0, math.pi])
-    first = np.cross(s, axis)
+    first = cross(s, axis)
     first = first / math.sqrt(float(first @ first))
-    second = np.cross(s, first) / math.sqrt(float(s @ s))
+    second = cross(s, first) / math.sqrt(float(s @ s))
     around: FloatArray = np.cos(steps)[:, None] * first + np.sin(steps)[:, None] * second
     return around
 
