@@ -138,12 +138,15 @@ def _name_rows(axes: Axes, blocks: dict[str, list[_Place]]) -> None:
 def _draw_times(axes: Axes, places: Sequence[_Place]) -> None:
     """Every run a dot, the median a bar, and in words what it comes to."""
     _log_scale(axes, 2.0, 5.0)
+    times_s = np.concatenate([place.times_s for place in places])
+    # Where the first image was enough: left of all others.
+    least_s = 0.5 * float(times_s[times_s > 0.0].min(initial=1.0))
     for place in places:
-        spread = np.linspace(-0.5, 0.5, len(place.times_s)) * _SPREAD_ROWS
-        axes.plot(
-            place.times_s, place.y + spread, ".", color=place.colour, alpha=0.35, markersize=4
-        )
-        _bar(axes, place.line.time_to_1pct_s, place.y, place.colour, 3.0)
+        dots_s = np.maximum(place.times_s, least_s)
+        spread = np.linspace(-0.5, 0.5, len(dots_s)) * _SPREAD_ROWS
+        axes.plot(dots_s, place.y + spread, ".", color=place.colour, alpha=0.35, markersize=4)
+        if place.line.time_to_1pct_s is not None:
+            _bar(axes, max(place.line.time_to_1pct_s, least_s), place.y, place.colour, 3.0)
         axes.text(
             *(1.01, place.y, _verdict(place)),
             transform=axes.get_yaxis_transform(),
@@ -163,6 +166,8 @@ def _verdict(place: _Place) -> str:
         words.append(f"×{place.faster:.{0 if place.faster >= 9.5 else 1}f}")
     if never:
         words.append("never" if never == line.runs else f"{never} never")
+    if line.failed:
+        words.append(f"({line.failed} failed)")
     return "  ".join(words)
 
 
@@ -194,9 +199,8 @@ def _draw_intervals(axes: Axes, places: Sequence[_Place]) -> None:
     axes.set_xlabel("truth in the 95 % interval [%]\ngreen: as it says   X: not")
 
 
-def _bar(axes: Axes, x: float | None, y: float, colour: str, width: float) -> None:
-    if x is not None:
-        axes.plot([x, x], [y - 0.36, y + 0.36], color=colour, linewidth=width)
+def _bar(axes: Axes, x: float, y: float, colour: str, width: float) -> None:
+    axes.plot([x, x], [y - 0.36, y + 0.36], color=colour, linewidth=width)
 
 
 def _log_scale(axes: Axes, *marked: float) -> None:

@@ -99,7 +99,7 @@ def test_a_store_keeps_rows_and_knows_what_is_missing(tmp_path: Path) -> None:
 
 def test_a_figure_is_drawn_of_whatever_there_is(tmp_path: Path) -> None:
     rows = [row(0, 1e-3), row(1, 2e-3, None, course=[0.5]), row(2, None, None)]
-    rows += [row(0, None, None, noise="hard")]
+    rows += [row(0, None, None, noise="hard"), row(0, 1e-3, 0.0, noise="laggy")]
     draw_campaign(tmp_path / "compare.png", "sphere", rows)
     assert (tmp_path / "compare.png").stat().st_size > 10000
 
