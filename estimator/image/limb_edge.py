@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimator.image.intrinsics import FloatArray
-from estimator.image.limb_profile import LEAST_WIDTH_PX, edge_rise, edge_step
+from estimator.image.limb_profile import LEAST_WIDTH_PX, edge_rise, edge_step, smooth_step
 from estimator.jit import jit_sums
 
 PHOTOMETRY = 7
@@ -27,12 +27,15 @@ _SEEN = 1e-9  # of the edge by a pixel, as a share
 def edge_rows(
     rows: FloatArray, count: int, along: FloatArray, blur: FloatArray, turn: FloatArray,
     p: FloatArray, level: FloatArray, noise: FloatArray, heavy_tail: float, geometry: int,
+    sigma: float | None,
 ) -> tuple[float, float]:  # fmt: skip
     """Fill what the normal equations of ``count`` pixels are made of into ``rows``.
 
     ``along`` (2,) is the sector's place on a cylinder's line and its length, -1 to 1; ``level``
-    (2,) the background's level and change along that the contrast is reckoned from. Returns how
-    many pixels see the edge and their squared residuals over the expected variance.
+    (2,) the background's level and change along that the contrast is reckoned from. ``sigma`` of
+    the point spread, or None for one so narrow that wider boxes will do: two kernels, each without
+    the other's work. Returns how many pixels see the edge and their squared residuals over the
+    expected variance.
     """
     q, m1, h1, m12, m2, h2 = blur[0], blur[1], blur[2], blur[3], blur[4], blur[5]
     cos, sin = turn[0], turn[1]
@@ -68,8 +71,13 @@ def edge_rows(
         bw = np.sqrt(max(w2, LEAST_WIDTH_PX**2))
         ba = np.sqrt(max(nu * nu + q, LEAST_WIDTH_PX**2))
         bb = np.sqrt(max(nv * nv + q, LEAST_WIDTH_PX**2))
-        share, c1, _, _ = edge_step(d, ba, bb, bw)
-        _, _, c_w2, c_var = edge_step(d, ba, bb, max(bw, _SMOOTH_WIDTH_PX))
+        if sigma is None:
+            share, c1, _, _ = edge_step(d, ba, bb, bw)
+            _, _, c_w2, c_var = edge_step(d, ba, bb, max(bw, _SMOOTH_WIDTH_PX))
+        else:
+            pa, pb = max(abs(nu), LEAST_WIDTH_PX), max(abs(nv), LEAST_WIDTH_PX)
+            share, c1, _, _ = smooth_step(d, pa, pb, bw, sigma)
+            _, _, c_w2, c_var = smooth_step(d, pa, pb, max(bw, _SMOOTH_WIDTH_PX), sigma)
         rise, root, root_1 = edge_rise(d, ba, bb, bw)
         out = 1.0 - share
         grey -= out * clutter + shade
