@@ -3,7 +3,8 @@
 Silhouettes are area coverage: each pixel near the outline is cut into 4 x 4 cells, and each
 cell's share is the exact area on the inner side of the straight edge through it (what is left,
 the outline's bend inside a cell, is below 1e-4 px). Motion blur averages sub-exposures of the
-moving target; sums are kept in floating point until noise is added and the result rounded.
+moving target, a point spread blurs an image of twice the size before it is averaged to pixels;
+sums are kept in floating point until noise is added and the result rounded.
 """
 
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ FloatArray = NDArray[np.float64]
 GreyImage = NDArray[np.uint8]
 
 WIDTH_PX, HEIGHT_PX = 640, 480
+_FINER = 2  # an image that a point spread blurs
 DEFAULT_INTRINSICS = Intrinsics(800.0, 800.0, 319.5, 239.5)
 SPHERE_RADIUS_M, CYLINDER_RADIUS_M = 0.019, 0.042
 
@@ -99,14 +101,28 @@ def render_exact(
     s: FloatArray, axis: FloatArray | None, look: Look, intrinsics: Intrinsics = DEFAULT_INTRINSICS
 ) -> FloatArray:
     """The noise-free exposure (height, width) in grey, not rounded."""
-    coverage = np.zeros((HEIGHT_PX, WIDTH_PX))
-    grey_sum = np.zeros((HEIGHT_PX, WIDTH_PX))
+    if look.psf_sigma_px == 0.0:
+        return _exposed(s, axis, look, intrinsics, 1)
+    # The lens blurs before the pixels average.
+    sigma = _FINER * look.psf_sigma_px
+    fine = _exposed(s, axis, look, intrinsics, _FINER)
+    blurred = cv2.GaussianBlur(fine, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+    pixels: FloatArray = blurred.reshape(HEIGHT_PX, _FINER, WIDTH_PX, _FINER).mean(axis=(1, 3))
+    return pixels
+
+
+def _exposed(
+    s: FloatArray, axis: FloatArray | None, look: Look, intrinsics: Intrinsics, finer: int
+) -> FloatArray:
+    """The exposure through a perfect lens, ``finer`` times as many pixels each way."""
+    shape = (HEIGHT_PX * finer, WIDTH_PX * finer)
+    coverage, grey_sum = np.zeros(shape), np.zeros(shape)
     a = np.zeros(3) if axis is None else axis
     light = np.zeros(3) if look.light is None else look.light / np.linalg.norm(look.light)
     low, high = (look.foreground,) * 2 if look.light is None else look.lit_range
     moving = look.blur_px != (0.0, 0.0) or look.growth != 0.0
     instants = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
-    rays_x, rays_y = _cell_rays(intrinsics)
+    rays_x, rays_y = _cell_rays(intrinsics, finer)
     for instant in instants if moving else [0.0]:
         s_now = _moved(s, axis, look, intrinsics, float(instant))
         expose(
@@ -114,13 +130,9 @@ def render_exact(
             look.wrapped_light,
         )  # fmt: skip
     count = look.sub_exposures if moving else 1
-    exact = grey_sum / count + (1.0 - coverage / count) * look.background
-    if look.psf_sigma_px > 0.0:
-        exact[:] = cv2.GaussianBlur(
-            exact, (0, 0), look.psf_sigma_px, borderType=cv2.BORDER_REPLICATE
-        )
-    result: FloatArray = exact
-    return result
+    background = np.broadcast_to(look.background, (HEIGHT_PX, WIDTH_PX))
+    behind = np.repeat(np.repeat(background, finer, axis=0), finer, axis=1)
+    return np.asarray(grey_sum / count + (1.0 - coverage / count) * behind, dtype=float)
 
 
 def _moved(
@@ -135,16 +147,17 @@ def _moved(
 _rays_cache: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
 
 
-def _cell_rays(intrinsics: Intrinsics) -> tuple[FloatArray, FloatArray]:
-    """Normalised x and y, each (height * 4, width * 4), of every cell's centre."""
+def _cell_rays(intrinsics: Intrinsics, finer: int) -> tuple[FloatArray, FloatArray]:
+    """Normalised x and y, each (height * n, width * n), of every cell's centre."""
     key = (
         intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px,
-        *intrinsics.distortion.tolist(),
+        *intrinsics.distortion.tolist(), finer,
     )  # fmt: skip
     if key not in _rays_cache:
         _rays_cache.clear()
-        u = (np.arange(WIDTH_PX * CELLS) + 0.5) / CELLS - 0.5
-        v = (np.arange(HEIGHT_PX * CELLS) + 0.5) / CELLS - 0.5
+        n = CELLS * finer
+        u = (np.arange(WIDTH_PX * n) + 0.5) / n - 0.5
+        v = (np.arange(HEIGHT_PX * n) + 0.5) / n - 0.5
         xy = intrinsics.normalise(np.stack(np.meshgrid(u, v), axis=-1))
         _rays_cache[key] = (np.ascontiguousarray(xy[..., 0]), np.ascontiguousarray(xy[..., 1]))
     return _rays_cache[key]

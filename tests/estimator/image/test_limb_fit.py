@@ -159,6 +159,15 @@ def test_a_square_is_not_taken_for_a_sphere() -> None:
     assert fit is None or fit.usable_fraction < 0.5
 
 
+@pytest.mark.parametrize("sigma_px", [0.5, 0.8])
+@pytest.mark.parametrize("target", ["sphere", "cylinder"])
+def test_a_lens_that_blurs_does_not_pull_the_outline_in(target: str, sigma_px: float) -> None:
+    samples = list(sequence(target, "clean", 5, 8, Look(psf_sigma_px=sigma_px)))
+    relative, normalised = errors(samples)
+    assert abs(relative.mean()) < 1.5e-5
+    assert normalised.mean() < 2.0
+
+
 def test_what_lies_outside_the_image_is_said() -> None:
     rng = np.random.default_rng(14)
     s = np.array([-5.0, 0.0, 13.0])
