@@ -35,25 +35,24 @@ from estimator.jit import jit_sums
 # Columns of the sector statistics.
 N_OUT, SS_OUT, N_IN, SS_IN, N_EDGE, CHI_EDGE, SHIFT, SHIFT_INFO, STATS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 _VECTOR = 8
-# The shape of a point spread narrower than this (sigma of 0.22 px) does not show.
-_NARROW_Q = 0.3
 
 
 @jit_sums
 def accumulate(
     pixels: FloatArray, starts: NDArray[np.int64], moved_by: FloatArray, blur: FloatArray,
     turn_rad: float, photometry: FloatArray, noise: FloatArray, ridge: FloatArray,
-    mean: FloatArray, predicted: bool, heavy_tail: float, margin_px: float,
+    mean: FloatArray, predicted: bool, heavy_tail: float, margin_px: float, smooth: bool,
     information: FloatArray, score: FloatArray, back: FloatArray, spread: FloatArray,
     stats: FloatArray, work: FloatArray,
 ) -> None:  # fmt: skip
     """Fill each sector's reduced information, score, photometry back-substitution and statistics.
 
     ``moved_by`` (geometry,) is how far the geometry is from that at which the pixels were located,
-    ``margin_px`` bounds the outline's error. ``noise`` (sectors, 2): variances of reading and of
-    the background. ``ridge`` (PHOTOMETRY,) and ``mean`` (sectors, PHOTOMETRY): the inverse prior
-    variance of p about its mean. ``predicted``: what is under the edge is `predict_clutter`'s, its
-    level that of ``mean``, and the pixels outside tell no more about it. ``information``
+    ``margin_px`` bounds the outline's error; ``smooth``: see `reach_px`. ``noise`` (sectors, 2):
+    variances of reading and of the background. ``ridge`` (PHOTOMETRY,) and ``mean`` (sectors,
+    PHOTOMETRY): the inverse prior variance of p about its mean. ``predicted``: what is under the
+    edge is `predict_clutter`'s, its level that of ``mean``, and the pixels outside tell no more
+    about it. ``information``
     (sectors, n, n), ``score`` (sectors, n) with n geometry and blur parameters; ``back``
     (sectors, PHOTOMETRY, n + 1):
     p = back[:, n] - back[:, :n] @ step;
@@ -74,7 +73,7 @@ def accumulate(
     fit = np.empty((PHOTOMETRY, width + 1))
     turn = np.array([np.cos(turn_rad), np.sin(turn_rad)])
     along, level = np.empty(2), np.empty(2)
-    reach = reach_px(blur, margin_px)
+    reach = reach_px(blur, margin_px, smooth)
     stats[:] = 0.0
     per_line = (starts.shape[0] - 1) // 2
     along[1] = 2.0 / max(per_line, 1)
@@ -87,7 +86,7 @@ def accumulate(
         n_edge, n_out, n_in = parted(
             pixels, starts[k], starts[k + 1], moved_by, reach, rows, outside, inside
         )
-        if blur[0] > _NARROW_Q:
+        if smooth:
             sigma = np.sqrt(blur[0] / 6.0)
             stats_k[N_EDGE], stats_k[CHI_EDGE] = edge_rows(
                 rows, n_edge, along, blur, turn, p, level, noise_k, heavy_tail, geometry, sigma

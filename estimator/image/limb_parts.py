@@ -35,11 +35,14 @@ from estimator.jit import jit, jit_inlined, jit_sums
 
 
 @jit
-def reach_px(blur: FloatArray, margin_px: float) -> float:
-    """How far from an outline known to ``margin_px`` pixels still see both sides of it."""
+def reach_px(blur: FloatArray, margin_px: float, smooth: bool) -> float:
+    """How far from an outline known to ``margin_px`` pixels still see both sides of it.
+
+    ``smooth`` when the point spread is seen as a Gaussian, not as wider boxes.
+    """
     width2 = blur[1] + abs(blur[2]) + blur[4] + abs(blur[5])
-    point_spread = 3.0 * np.sqrt(blur[0] / 6.0)
-    return float(margin_px + 0.5 + point_spread + 0.5 * np.sqrt(max(width2, 0.0)))
+    still = 0.5 + 3.0 * np.sqrt(blur[0] / 6.0) if smooth else 0.5 * np.sqrt(blur[0] * 2.0 + 1.0)
+    return float(margin_px + still + 0.5 * np.sqrt(max(width2, 0.0)))
 
 
 @jit_sums

@@ -37,6 +37,7 @@ _CONVERGED_RAD = 1e-5
 _CLUTTER_MARGIN_PX = 0.5  # what the outline may be off where clutter is predicted
 _LEAST_TEXTURE = 1e-3
 _NO_SLOPE = 100.0  # inverse variance of what a prediction leaves of the background's slope
+_NARROW_Q = 0.3  # the shape of a point spread narrower than this (sigma of 0.22 px) does not show
 _COARSE_STRIDE, _COARSE_MARGIN_PX, _FINE_MARGIN_PX = 4, 1.2, 0.3
 # Inverse prior variances of the photometry. Slopes and limb terms start stiff: they could stand
 # in for a blur not yet found. Then they are free, for their true spread to be learnt.
@@ -87,10 +88,12 @@ def solve_outline(
         index = _COARSE_STEPS if index == -1 and known.shape[0] > 0 else index + 1
         fine = index >= _COARSE_STEPS
         settled = index > _COARSE_STEPS or (fine and known.shape[0] == 0)
+        # At first a wide edge stands for a wrong guess, not for a lens.
+        smooth = blur[0] > _NARROW_Q and (index >= _GEOMETRY_STEPS or known.shape[0] > 0)
         accumulate(
             used, used_starts, moved_by, blur, turn_rad, photometry,
             noise, ridge, mean, texture > 0.0, 0.0 if index < 0 else _HEAVY_TAIL,
-            _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, information, score, back, spread,
+            _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, smooth, information, score, back, spread,
             stats, work,
         )  # fmt: skip
         if index >= 0:
@@ -118,7 +121,7 @@ def solve_outline(
                 texture = _foresee(image, used, starts, sector_px, blur, noise, ridge, mean)
                 shaded = predict_shading(
                     image, camera, used, starts, s, a, blur, turn_rad,
-                    reach_px(blur, _CLUTTER_MARGIN_PX),
+                    reach_px(blur, _CLUTTER_MARGIN_PX, blur[0] > _NARROW_Q),
                 )  # fmt: skip
         _learn(
             photometry, spread, stats, ridge, mean, index - _COARSE_STEPS, geometry == 4,
@@ -139,7 +142,7 @@ def _foresee(
     blur: FloatArray, noise: FloatArray, ridge: FloatArray, mean: FloatArray,
 ) -> float:  # fmt: skip
     """Predict clutter if there is some; the variance known so far, which this replaces, or 0."""
-    reach = reach_px(blur, _CLUTTER_MARGIN_PX)
+    reach = reach_px(blur, _CLUTTER_MARGIN_PX, blur[0] > _NARROW_Q)
     if not predict_clutter(image, pixels, starts, sector_px, reach, noise[0, 0], mean):
         return 0.0
     texture = max(float(np.mean(noise[:, 1])), _LEAST_TEXTURE)
