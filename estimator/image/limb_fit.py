@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from estimator.image.edges_camera import pack_camera
 from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
 from estimator.image.intrinsics import FloatArray, Intrinsics
-from estimator.image.limb_pixels import collect
+from estimator.image.limb_pixels import GREY, collect
 from estimator.image.limb_solve import solve_outline
 from estimator.image.limb_step import step_rad
 from estimator.image.limb_verdict import in_view, verdict
@@ -27,6 +27,9 @@ _CONVERGED_PX = 0.02
 # An outline's systematic error in px over the squared width of the motion in px: what makes the
 # normalised squared errors about 1 on side-lit, moving targets before clutter.
 _SHADING_SPHERE, _SHADING_CYLINDER = 0.0006, 0.002
+# Where so many pixels of the band are black or white, one of the edge's levels may be a little
+# beyond; more than a little shows as scatter.
+_CLIPPED_SHARE, _CLIPPED_PX = 0.05, 0.012
 _LEAST_SECTORS = 6
 _NOTHING = np.empty(0)
 # Squared widths of the point spread and of the motion along two axes, and how alike is alike.
@@ -105,7 +108,7 @@ def _refine(
     return LimbFit(
         s=s,
         covariance=_honest(model, scatter)
-        + _shading_covariance(s, axis, blur, axis0 is None, intrinsics.fx_px),
+        + _shift_covariance(s, axis, _light_rad(blur, pixels[GREY], axis0 is None, intrinsics)),
         axis=None if axis0 is None else axis,
         converged=converged,
         blur_px=math.sqrt(blur[1]),
@@ -129,16 +132,23 @@ def _alike(blur: FloatArray, known: FloatArray) -> bool:
     return all(abs(blur[i] - known[i]) < _ALIKE_PX2 + _ALIKE_SHARE * known[i] for i in _BLUR_WIDTHS)
 
 
-def _shading_covariance(
-    s: FloatArray, axis: FloatArray, blur: FloatArray, sphere: bool, focal_px: float
-) -> FloatArray:
-    """What is added (3, 3) for light that the model of its change across the outline misses.
+def _light_rad(blur: FloatArray, grey: FloatArray, sphere: bool, intrinsics: Intrinsics) -> float:
+    """What the outline may be off for light that the model does not know (rad).
 
-    Motion of width w mixes what lies w about the outline; the part of second order grows with w^2.
+    Of its change across the outline: motion of width w mixes what lies w about the outline, and
+    the part of second order grows with w^2. And of light too weak or too strong for the camera.
     """
-    angle = (_SHADING_SPHERE if sphere else _SHADING_CYLINDER) * (blur[1] + blur[4]) / focal_px
+    off_px = (_SHADING_SPHERE if sphere else _SHADING_CYLINDER) * (blur[1] + blur[4])
+    if max(np.mean(grey <= 0.0), np.mean(grey >= 255.0)) > _CLIPPED_SHARE:
+        off_px = math.hypot(off_px, _CLIPPED_PX)
+    return float(off_px / intrinsics.fx_px)
+
+
+def _shift_covariance(s: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
+    """Of s (3, 3), for an outline that is off by ``angle``: a sphere's all around, each side of
+    a cylinder for itself."""
     norm2 = float(s @ s)
-    if sphere:  # |s| = 1 / sin(theta), and theta is the angle that is wrong
+    if not np.any(axis):  # |s| = 1 / sin(theta), and theta is the angle that is wrong
         towards: FloatArray = angle**2 * (norm2 - 1.0) * np.outer(s, s)
         return towards
     one, other = lines_of_cylinder(s, axis)

@@ -93,8 +93,8 @@ def solve_outline(
         accumulate(
             used, used_starts, moved_by, blur, turn_rad, photometry,
             noise, ridge, mean, texture > 0.0, 0.0 if index < 0 else _HEAVY_TAIL,
-            _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, smooth, information, score, back, spread,
-            stats, work,
+            _FINE_MARGIN_PX if settled else _COARSE_MARGIN_PX, smooth,
+            information, score, back, spread, stats, work,
         )  # fmt: skip
         if index >= 0:
             total, step = next_step(information, score, blur, geometry, index < _GEOMETRY_STEPS)

@@ -168,6 +168,16 @@ def test_a_lens_that_blurs_does_not_pull_the_outline_in(target: str, sigma_px: f
     assert normalised.mean() < 2.0
 
 
+@pytest.mark.parametrize("look", [Look(258.0, noise_grey=3.0), Look(220.0, 0.0, noise_grey=4.0)])
+@pytest.mark.parametrize("target", ["sphere", "cylinder"])
+def test_light_beyond_what_the_camera_shows_makes_the_outline_less_certain(
+    target: str, look: Look
+) -> None:
+    relative, normalised = errors(list(sequence(target, "clean", 5, 8, look)))
+    assert np.abs(relative).max() < 3e-4
+    assert normalised.mean() < 2.0
+
+
 def test_what_lies_outside_the_image_is_said() -> None:
     rng = np.random.default_rng(14)
     s = np.array([-5.0, 0.0, 13.0])
