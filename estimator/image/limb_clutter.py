@@ -20,7 +20,7 @@ from estimator.image.limb_pixels import (
     U,
     V,
 )
-from estimator.jit import jit
+from estimator.jit import jit, jit_sums
 
 # A strip beside each side: samples about 1 px apart along it, and so many outwards from where the
 # image is pure background, _BEYOND_PX further than the edge reaches.
@@ -48,11 +48,12 @@ def predict_clutter(
     too little of it in view, for a prediction to help.
     """
     per_side = (starts.shape[0] - 1) // 2
-    strips = np.empty((2, per_side * per_sector, _LAYERS))
-    rough, levels = False, np.empty(2)
+    strips = np.empty((2, _LAYERS, per_side * per_sector))
+    seen, levels, counts = np.empty(strips.shape[::2]), np.empty(2), np.zeros(2, np.int64)
+    rough = False
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
-        _sample(image, pixels, at, per_sector, reach_px, strips[side, :, :1])
+        _sample(image, pixels, at, per_sector, reach_px, strips[side, :1])
         roughness = _roughness(strips[side])
         if not roughness >= 0.0:
             return False
@@ -62,13 +63,16 @@ def predict_clutter(
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
         _sample(image, pixels, at, per_sector, reach_px, strips[side])
-        levels[side], count = _centre(strips[side])
-        if count < _LEAST_SAMPLES:
+        levels[side], counts[side] = _centre(strips[side], seen[side])
+        if counts[side] < _LEAST_SAMPLES:
             return False
     for side in range(2):
         at = starts[side * per_side : (side + 1) * per_side + 1]
-        weights, variance = _weights(strips[side], read_variance)
-        predicted = _predicted(strips[side], weights)
+        samples = np.empty((_ALONG.shape[0] * _OUTWARDS.shape[0], strips.shape[2]))
+        _fill_samples(strips[side], seen[side], _DEEP, samples)
+        weights, variance = _weights(strips[side], samples, counts[side], read_variance)
+        _fill_samples(strips[side], seen[side], 0, samples)
+        predicted = _predicted(samples, weights)
         level = mean[side * per_side : (side + 1) * per_side, 0]
         _interpolate(pixels, at, per_sector, reach_px, predicted, variance, level)
         level += levels[side]
@@ -80,7 +84,7 @@ def _sample(
     image: GreyImage, pixels: FloatArray, starts: NDArray[np.int64], per_sector: int,
     reach_px: float, strip: FloatArray,
 ) -> None:  # fmt: skip
-    """Grey (along, layers) beside one side's sectors; NaN where there is none."""
+    """Grey (layers, along) beside one side's sectors; NaN where there is none."""
     strip[:] = np.nan
     for k in range(starts.shape[0] - 1):
         if starts[k + 1] - starts[k] < _LEAST_PIXELS:
@@ -103,18 +107,18 @@ def _sample(
         length = along / max(squares, 1e-9)
         for i in range(per_sector):
             t = length * ((i + 0.5) / per_sector - 0.5 - tau)
-            for m in range(strip.shape[1]):
+            for m in range(strip.shape[0]):
                 d = reach_px + _BEYOND_PX + m
                 u, v = fu - nv * t - nu * d, fv + nu * t - nv * d
-                strip[k * per_sector + i, m] = bilinear(image, u, v)
+                strip[m, k * per_sector + i] = bilinear(image, u, v)
 
 
 @jit
 def _roughness(strip: FloatArray) -> float:
     """Variance of the innermost layer's grey within _ROUGH_WITHIN_PX; negative when unknown."""
     total, count = 0.0, 0
-    for i in range(strip.shape[0] - _ROUGH_WITHIN_PX):
-        change = strip[i + _ROUGH_WITHIN_PX, 0] - strip[i, 0]
+    for i in range(strip.shape[1] - _ROUGH_WITHIN_PX):
+        change = strip[0, i + _ROUGH_WITHIN_PX] - strip[0, i]
         if change == change:
             total += 0.5 * change * change
             count += 1
@@ -122,58 +126,60 @@ def _roughness(strip: FloatArray) -> float:
 
 
 @jit
-def _centre(strip: FloatArray) -> tuple[float, int]:
-    """Subtract the mean; all of a row is NaN if some is. Returns it and how many rows are not."""
+def _centre(strip: FloatArray, seen: FloatArray) -> tuple[float, int]:
+    """Subtract the mean, which it returns, and how many places along the strip are all seen.
+
+    ``seen`` (along,) is filled with 1 there and 0 elsewhere, where the strip is then zero.
+    """
     total, count = 0.0, 0
-    for i in range(strip.shape[0]):
-        row = np.sum(strip[i])
-        if row == row:
-            total += row
+    for i in range(strip.shape[1]):
+        grey = np.sum(strip[:, i])
+        seen[i] = 1.0 if grey == grey else 0.0
+        if grey == grey:
+            total += grey
             count += 1
-        else:
-            strip[i] = np.nan
-    level = total / max(count * strip.shape[1], 1)
-    strip -= level
+    level = total / max(count * strip.shape[0], 1)
+    for m in range(strip.shape[0]):
+        for i in range(strip.shape[1]):
+            strip[m, i] = strip[m, i] - level if seen[i] > 0.0 else 0.0
     return level, count
 
 
 @jit
-def _samples(strip: FloatArray, i: int, base: int, out: FloatArray) -> bool:
-    """The samples that predict at ``i`` along the strip into ``out``; False where there is none."""
-    if np.isnan(strip[i, 0]):
-        return False
-    last = strip.shape[0] - 1
+def _fill_samples(strip: FloatArray, seen: FloatArray, base: int, samples: FloatArray) -> None:
+    """The samples (samples, along) that predict what is inwards of layer ``base``; 0 if unseen."""
+    last = strip.shape[1] - 1
+    both = np.empty((2, strip.shape[1]), dtype=np.int64)
     w = 0
     for a in _ALONG:
-        before, after = max(i - a, 0), min(i + a, last)
-        if np.isnan(strip[before, 0]) or np.isnan(strip[after, 0]):
-            before = after = i
+        for i in range(strip.shape[1]):
+            both[0, i], both[1, i] = max(i - a, 0), min(i + a, last)
+            if seen[both[0, i]] * seen[both[1, i]] == 0.0:
+                both[0, i] = both[1, i] = i
         for m in _OUTWARDS:
-            out[w] = 0.5 * (strip[before, base + m] + strip[after, base + m])
+            for i in range(strip.shape[1]):
+                grey = strip[base + m, both[0, i]] + strip[base + m, both[1, i]]
+                samples[w, i] = 0.5 * seen[i] * grey
             w += 1
-    return True
 
 
-@jit
-def _weights(strip: FloatArray, read_variance: float) -> tuple[FloatArray, FloatArray]:
+@jit_sums
+def _weights(
+    strip: FloatArray, samples: FloatArray, count: int, read_variance: float
+) -> tuple[FloatArray, FloatArray]:
     """Weights (samples, _DEEP + 1) of the samples, and the variance left unknown (_DEEP + 1,).
 
     Least squares of each layer on those further out, all of it pure background.
     """
-    size = _ALONG.shape[0] * _OUTWARDS.shape[0]
-    k, w = np.zeros((size, size)), np.zeros((size, _DEEP + 1))
-    seen, own, count = np.empty(size), np.zeros(_DEEP + 1), 0
-    for i in range(0, strip.shape[0], 2):
-        if not _samples(strip, i, _DEEP, seen):
-            continue
-        count += 1
-        for a in range(size):
-            for b in range(a + 1):
-                k[a, b] += seen[a] * seen[b]
-            for deep in range(_DEEP + 1):
-                w[a, deep] += seen[a] * strip[i, _DEEP - deep]
+    size = samples.shape[0]
+    k, w, own = np.empty((size, size)), np.empty((size, _DEEP + 1)), np.empty(_DEEP + 1)
+    for a in range(size):
+        for b in range(a + 1):
+            k[a, b] = _product(samples[a], samples[b])
         for deep in range(_DEEP + 1):
-            own[deep] += strip[i, _DEEP - deep] ** 2
+            w[a, deep] = _product(samples[a], strip[_DEEP - deep])
+    for deep in range(_DEEP + 1):
+        own[deep] = _product(strip[_DEEP - deep], strip[_DEEP - deep])
     # The first layer "predicts" itself: its noise is not to be part of that.
     noise = min(_NOISE_LEFT * read_variance * count, 0.5 * own[0])
     w[0, 0] -= noise
@@ -191,16 +197,23 @@ def _weights(strip: FloatArray, read_variance: float) -> tuple[FloatArray, Float
     return w, variance
 
 
-@jit
-def _predicted(strip: FloatArray, weights: FloatArray) -> FloatArray:
-    """Clutter (along, _DEEP + 1) under the edge."""
-    out = np.zeros((strip.shape[0], _DEEP + 1))
-    seen = np.empty(weights.shape[0])
-    for i in range(strip.shape[0]):
-        if _samples(strip, i, 0, seen):
-            for a in range(weights.shape[0]):
-                for deep in range(_DEEP + 1):
-                    out[i, deep] += weights[a, deep] * seen[a]
+@jit_sums
+def _product(one: FloatArray, other: FloatArray) -> float:
+    total = 0.0
+    for i in range(one.shape[0]):
+        total += one[i] * other[i]
+    return total
+
+
+@jit_sums
+def _predicted(samples: FloatArray, weights: FloatArray) -> FloatArray:
+    """Clutter (_DEEP + 1, along) under the edge."""
+    out = np.zeros((_DEEP + 1, samples.shape[1]))
+    for deep in range(_DEEP + 1):
+        for a in range(weights.shape[0]):
+            weight = weights[a, deep]
+            for i in range(samples.shape[1]):
+                out[deep, i] += weight * samples[a, i]
     return out
 
 
@@ -216,11 +229,11 @@ def _interpolate(
             x = pixels[DISTANCE, i] + reach_px + _BEYOND_PX
             x = min(max(x, 0.0), _DEEP - 1e-6)
             t = (k + pixels[TAU, i] + 0.5) * per_sector - 0.5
-            t = min(max(t, 0.0), predicted.shape[0] - 1.001)
-            row, deep = int(t), int(x)
-            ft, fx = t - row, x - deep
-            near = (1.0 - ft) * predicted[row, deep] + ft * predicted[row + 1, deep]
-            far = (1.0 - ft) * predicted[row, deep + 1] + ft * predicted[row + 1, deep + 1]
+            t = min(max(t, 0.0), predicted.shape[1] - 1.001)
+            at, deep = int(t), int(x)
+            ft, fx = t - at, x - deep
+            near = (1.0 - ft) * predicted[deep, at] + ft * predicted[deep, at + 1]
+            far = (1.0 - ft) * predicted[deep + 1, at] + ft * predicted[deep + 1, at + 1]
             pixels[CLUTTER, i] = (1.0 - fx) * near + fx * far
             pixels[CLUTTER_VARIANCE, i] = (1.0 - fx) * variance[deep] + fx * variance[deep + 1]
             if abs(pixels[DISTANCE, i]) < reach_px:

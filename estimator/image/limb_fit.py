@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.image.edges_camera import pack_camera
-from estimator.image.edges_cylinder import cylinder_covariance, lines_of_cylinder
+from estimator.image.edges_cylinder import cross, cylinder_covariance, lines_of_cylinder
 from estimator.image.intrinsics import FloatArray, Intrinsics
-from estimator.image.limb_pixels import GREY, collect
+from estimator.image.limb_pixels import CLUTTER, GREY, collect
 from estimator.image.limb_solve import solve_outline
-from estimator.image.limb_step import step_rad
 from estimator.image.limb_verdict import in_view, verdict
 
 GreyImage = NDArray[np.uint8]
@@ -23,7 +22,7 @@ GreyImage = NDArray[np.uint8]
 # The band of pixels looked at, to both sides of the outline, and the length of its sectors.
 _BAND_PX = 6.0
 _SPHERE_SECTOR_PX, _CYLINDER_SECTOR_PX = 12, 22
-_CONVERGED_PX = 0.02
+_CONVERGED_PX, _CONVERGED_DEVIATIONS = 0.02, 1.0  # or so many standard deviations
 # An outline's systematic error in px over the squared width of the motion in px: what makes the
 # normalised squared errors about 1 on side-lit, moving targets before clutter.
 _SHADING_SPHERE, _SHADING_CYLINDER = 0.0006, 0.002
@@ -32,8 +31,8 @@ _SHADING_SPHERE, _SHADING_CYLINDER = 0.0006, 0.002
 _CLIPPED_SHARE, _CLIPPED_PX = 0.05, 0.012
 _LEAST_SECTORS = 6
 _NOTHING = np.empty(0)
-# Squared widths of the point spread and of the motion along two axes, and how alike is alike.
-_BLUR_WIDTHS, _ALIKE_PX2, _ALIKE_SHARE = (0, 1, 4), 0.7, 0.2
+# How alike the squared widths of the point spread and of the motion are when they are alike.
+_ALIKE_PX2, _ALIKE_SHARE = 0.7, 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +94,18 @@ def _refine(
     if np.count_nonzero(seen) < _LEAST_SECTORS:
         return None
     known = _NOTHING if learnt is None else learnt
-    s, axis, blur, photometry, stats, noise, model, scatter, step, learnt = solve_outline(
-        image, camera, pixels, starts, s0, a, sector_px, known
-    )
-    solved = math.isfinite(s.sum()) and math.isfinite(scatter.sum())
-    converged = solved and intrinsics.fx_px * step_rad(step, s) < _CONVERGED_PX
-    if len(known) > 0 and not (converged and _alike(blur, known)):
-        return _refine(image, intrinsics, s0, axis0, None)
+    while True:
+        s, axis, blur, photometry, stats, noise, model, scatter, last, now_known = solve_outline(
+            image, camera, pixels, starts, s0, a, sector_px, known
+        )
+        solved = math.isfinite(s.sum()) and math.isfinite(scatter.sum())
+        converged = solved and bool(
+            intrinsics.fx_px * last[0] < _CONVERGED_PX or last[1] < _CONVERGED_DEVIATIONS
+        )
+        if len(known) == 0 or (converged and _alike(blur, known, axis0 is None)):
+            break
+        known = _NOTHING
+        pixels[CLUTTER:] = 0.0  # what was predicted with the other image's blur
     if not solved:
         return None
     usable, chi2 = verdict(photometry, stats, noise, seen)
@@ -118,7 +122,7 @@ def _refine(
         usable_fraction=np.count_nonzero(usable) / np.count_nonzero(seen),
         in_view=seen,
         usable=usable,
-        learnt=learnt,
+        learnt=now_known,
     )
 
 
@@ -127,9 +131,17 @@ def blur_variance_px2(learnt: FloatArray) -> float:
     return float(learnt[0] / 6.0 + learnt[1] / 12.0)
 
 
-def _alike(blur: FloatArray, known: FloatArray) -> bool:
+def _alike(blur: FloatArray, known: FloatArray, sphere: bool) -> bool:
     """Whether the blur found is about the known one, as it must be where few steps were made."""
-    return all(abs(blur[i] - known[i]) < _ALIKE_PX2 + _ALIKE_SHARE * known[i] for i in _BLUR_WIDTHS)
+    return all(
+        abs(now - before) < _ALIKE_PX2 + _ALIKE_SHARE * before
+        for now, before in zip(_widths(blur, sphere), _widths(known, sphere), strict=True)
+    )
+
+
+def _widths(blur: FloatArray, sphere: bool) -> list[float]:
+    """Squared widths of the point spread and of the motion along its axes; of all across a line."""
+    return [blur[0], blur[1], blur[4]] if sphere else [2.0 * blur[0] + blur[1] + blur[4] / 3.0]
 
 
 def _light_rad(blur: FloatArray, grey: FloatArray, sphere: bool, intrinsics: Intrinsics) -> float:
@@ -152,7 +164,7 @@ def _shift_covariance(s: FloatArray, axis: FloatArray, angle: float) -> FloatArr
         towards: FloatArray = angle**2 * (norm2 - 1.0) * np.outer(s, s)
         return towards
     one, other = lines_of_cylinder(s, axis)
-    spread = [np.outer(t, t) * angle**2 for t in (np.cross(axis, one), np.cross(axis, other))]
+    spread = [np.outer(t, t) * angle**2 for t in (cross(axis, one), cross(axis, other))]
     return cylinder_covariance(one, other, spread[0], spread[1])
 
 

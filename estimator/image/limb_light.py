@@ -7,6 +7,8 @@ from estimator.image.limb_linear import cholesky, solve_column
 from estimator.jit import jit
 
 BINS = 32  # of the angle, over half a turn
+# Of a bin: how many samples, their mean angle and grey; then the angle's cosine and sine.
+COUNT, ANGLE, GREY, COS, SIN, COLUMNS = range(6)
 _LEAST_SAMPLES, _LEAST_BINS = 200, 8
 _DIRECTIONS, _LIGHT_STEPS = 48, 5
 # What a body's grey may differ (rms) from light on a plain surface, with a share of its range.
@@ -23,11 +25,12 @@ def light_on(bins: FloatArray) -> tuple[FloatArray, bool]:
     """
     count, used = 0.0, 0
     for j in range(BINS):
-        if bins[j, 0] > 0.0:
-            count += bins[j, 0]
+        if bins[j, COUNT] > 0.0:
+            count += bins[j, COUNT]
             used += 1
-            bins[j, 1] /= bins[j, 0]
-            bins[j, 2] /= bins[j, 0]
+            bins[j, ANGLE] /= bins[j, COUNT]
+            bins[j, GREY] /= bins[j, COUNT]
+        bins[j, COS], bins[j, SIN] = np.cos(bins[j, ANGLE]), np.sin(bins[j, ANGLE])
     light = np.zeros(3)
     if count < _LEAST_SAMPLES or used < _LEAST_BINS:
         return light, False
@@ -44,13 +47,13 @@ def light_on(bins: FloatArray) -> tuple[FloatArray, bool]:
     if least > _CLEARLY * everywhere:
         light[:2], light[2], least = all_lit[:2], 0.0, everywhere
     plain = np.zeros(3)
-    plain[2] = np.sum(bins[:, 0] * bins[:, 2]) / count
+    plain[2] = np.sum(bins[:, COUNT] * bins[:, GREY]) / count
     if least > _PLAIN * _misfit(bins, plain, False):
         return light, False
     lowest, highest = np.inf, -np.inf
     for j in range(BINS):
-        if bins[j, 0] > 0.0:
-            lowest, highest = min(lowest, bins[j, 2]), max(highest, bins[j, 2])
+        if bins[j, COUNT] > 0.0:
+            lowest, highest = min(lowest, bins[j, GREY]), max(highest, bins[j, GREY])
     allowed = _MISFIT_GREY + _MISFIT_SHARE * (highest - lowest)
     return light, least < allowed * allowed * count
 
@@ -65,12 +68,12 @@ def _from_around(bins: FloatArray) -> FloatArray:
         fit[0], fit[1] = np.cos(around), np.sin(around)
         n = sx = sy = sxx = sxy = 0.0
         for j in range(BINS):
-            x = max(fit[0] * np.cos(bins[j, 1]) + fit[1] * np.sin(bins[j, 1]), 0.0)
-            n += bins[j, 0]
-            sx += bins[j, 0] * x
-            sy += bins[j, 0] * bins[j, 2]
-            sxx += bins[j, 0] * x * x
-            sxy += bins[j, 0] * x * bins[j, 2]
+            x = max(fit[0] * bins[j, COS] + fit[1] * bins[j, SIN], 0.0)
+            n += bins[j, COUNT]
+            sx += bins[j, COUNT] * x
+            sy += bins[j, COUNT] * bins[j, GREY]
+            sxx += bins[j, COUNT] * x * x
+            sxy += bins[j, COUNT] * x * bins[j, GREY]
         strength = max((n * sxy - sx * sy) / max(n * sxx - sx * sx, 1e-6), 0.0)
         fit[0] *= strength
         fit[1] *= strength
@@ -86,8 +89,8 @@ def _fitted(bins: FloatArray, light: FloatArray) -> FloatArray:
     """Least squares (3,) of light towards the camera, across, and level, lit where ``light`` is."""
     m, rhs, row = np.zeros((3, 3)), np.zeros((3, 1)), np.empty(3)
     for j in range(BINS):
-        n, angle, grey = bins[j, 0], bins[j, 1], bins[j, 2]
-        row[0], row[1], row[2] = np.cos(angle), np.sin(angle), 1.0
+        n, grey = bins[j, COUNT], bins[j, GREY]
+        row[0], row[1], row[2] = bins[j, COS], bins[j, SIN], 1.0
         if light[2] > 0.0 and light[0] * row[0] + light[1] * row[1] < 0.0:
             row[0] = row[1] = 0.0
         for i in range(3):
@@ -106,8 +109,8 @@ def _misfit(bins: FloatArray, fit: FloatArray, shadow: bool) -> float:
     """Sum of squares that ``fit`` (3,) leaves."""
     total = 0.0
     for j in range(BINS):
-        lit = fit[0] * np.cos(bins[j, 1]) + fit[1] * np.sin(bins[j, 1])
-        total += bins[j, 0] * (bins[j, 2] - fit[2] - (max(lit, 0.0) if shadow else lit)) ** 2
+        lit = fit[0] * bins[j, COS] + fit[1] * bins[j, SIN]
+        total += bins[j, COUNT] * (bins[j, GREY] - fit[2] - (max(lit, 0.0) if shadow else lit)) ** 2
     return total
 
 

@@ -235,11 +235,10 @@ def thinned(
     some_starts = np.zeros_like(starts)
     for k in range(starts.shape[0] - 1):
         some_starts[k + 1] = some_starts[k] + (starts[k + 1] - starts[k] + stride - 1) // stride
-    some = np.empty((ROWS, some_starts[-1]))
-    for k in range(starts.shape[0] - 1):
-        for i in range(some_starts[k], some_starts[k + 1]):
-            for j in range(DISTANCE):
-                some[j, i] = pixels[j, starts[k] + (i - some_starts[k]) * stride]
-            some[CLUTTER, i] = some[CLUTTER_VARIANCE, i] = 0.0
-            some[SHADE, i] = some[SHADE_SLOPE, i] = 0.0
+    some = np.zeros((ROWS, some_starts[-1]))
+    for j in range(DISTANCE):
+        for k in range(starts.shape[0] - 1):
+            at = starts[k] - some_starts[k] * stride
+            for i in range(some_starts[k], some_starts[k + 1]):
+                some[j, i] = pixels[j, at + i * stride]
     return some, some_starts

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimator.image.cone import outline_frame
 from estimator.image.edges_camera import GreyImage, bilinear, pixel_of
 from estimator.image.intrinsics import FloatArray
-from estimator.image.limb_light import BINS, light_on, lit
+from estimator.image.limb_light import ANGLE, BINS, COLUMNS, COUNT, GREY, light_on, lit
 from estimator.image.limb_pixels import (
     DISTANCE,
     GEOMETRY,
@@ -32,6 +32,7 @@ _LEAST_PIXELS = 8
 _BEYOND_PX = 0.5  # further inside than the edge reaches
 _CELL_PX = 0.25  # of the table of the blurred shading
 _MOST_CELLS = 256
+_ALIKE = 3  # neighbouring sectors see the body about as large, and share a table
 
 
 @jit
@@ -47,7 +48,7 @@ def predict_shading(
     """
     per_side = (starts.shape[0] - 1) // 2
     length = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-    bins = np.zeros((BINS, 3))
+    bins = np.zeros((BINS, COLUMNS))
     frame = outline_frame(s, a)
     for k in range(per_side):
         _sample(image, camera, pixels, starts, k, per_side, s, a, frame, reach_px, bins)
@@ -56,11 +57,13 @@ def predict_shading(
         return False
     limb = 0.5 * np.pi - np.arcsin(1.0 / length)
     table = np.empty(_MOST_CELLS)
-    for k in range(2 * per_side):
-        first, last = starts[k], starts[k + 1]
-        towards = 1.0 if k < per_side else -1.0
-        if last > first:
-            _fill(pixels, first, last, light, limb, towards, length, blur, turn_rad, table)
+    for side in range(2):
+        towards = 1.0 if side == 0 else -1.0
+        for k in range(0, per_side, _ALIKE):
+            first = starts[side * per_side + k]
+            last = starts[side * per_side + min(k + _ALIKE, per_side)]
+            if last > first:
+                _fill(pixels, first, last, light, limb, towards, length, blur, turn_rad, table)
     return True
 
 
@@ -94,9 +97,9 @@ def _sample(
             continue
         angle = np.arcsin(off) - theta  # of the normal from the direction towards the camera
         at = min(int((angle / np.pi + 0.5) * BINS), BINS - 1)
-        bins[at, 0] += 1.0
-        bins[at, 1] += angle
-        bins[at, 2] += grey
+        bins[at, COUNT] += 1.0
+        bins[at, ANGLE] += angle
+        bins[at, GREY] += grey
 
 
 @jit
@@ -104,7 +107,7 @@ def _fill(
     pixels: FloatArray, start: int, stop: int, light: FloatArray, limb_rad: float, towards: float,
     length: float, blur: FloatArray, turn_rad: float, table: FloatArray,
 ) -> None:  # fmt: skip
-    """The blurred shading at one sector's pixels."""
+    """The blurred shading at the pixels of some neighbouring sectors."""
     n = 1.0 / (stop - start)
     radius = nu = nv = 0.0
     least, most = np.inf, -np.inf

@@ -20,7 +20,14 @@ from estimator.image.limb_normal import STATS, accumulate
 from estimator.image.limb_parts import reach_px
 from estimator.image.limb_pixels import thinned
 from estimator.image.limb_shade import predict_shading
-from estimator.image.limb_step import back_substitute, covariances, next_step, step_rad
+from estimator.image.limb_step import (
+    back_substitute,
+    covariances,
+    next_step,
+    shorten,
+    step_in_deviations,
+    step_rad,
+)
 from estimator.jit import jit
 
 # What an image tells about the next one: the blur, the turn of its axes, the two noise levels.
@@ -33,7 +40,9 @@ _TEXTURE_WEIGHT_SPHERE, _TEXTURE_WEIGHT_CYLINDER = 2.0, 1.0
 # photometry's spread is learnt in the first of these only: the slow rest of it brings nothing.
 _GEOMETRY_STEPS, _COARSE_STEPS, _LEARNING_STEPS, _ALL_STEPS = 1, 3, 2, 9
 _SHADING_STEPS = 5  # the first of these is left out: it finds the blur
-_CONVERGED_RAD = 1e-5
+# The last step is this small, or this small a part of the standard deviation: each is about a
+# fifth of the one before it.
+_CONVERGED_RAD, _CONVERGED_DEVIATIONS = 1e-5, 0.5
 _CLUTTER_MARGIN_PX = 0.5  # what the outline may be off where clutter is predicted
 _LEAST_TEXTURE = 1e-3
 _NO_SLOPE = 100.0  # inverse variance of what a prediction leaves of the background's slope
@@ -60,8 +69,8 @@ def solve_outline(
 
     Returns s, a, blur (BLUR,), photometry (sectors, PHOTOMETRY), the sectors' statistics (sectors,
     STATS), noise (sectors, 2), the covariances of s (3, 3) from the model and from the scatter of
-    the sectors' scores, the last step, and what is now known. s is NaN when the equations had no
-    solution.
+    the sectors' scores, how far the last step went (2,) in rad and in standard deviations, and what
+    is now known. s is NaN when the equations had no solution.
     """
     geometry = 3 + int(np.any(a != 0.0))
     sectors, n = starts.shape[0] - 1, geometry + BLUR
@@ -80,7 +89,7 @@ def solve_outline(
     s_there, a_there, moved_by = s, a, np.zeros(geometry)
     work = np.zeros((3, ALL_ROWS * MOST_PIXELS))
     mean, texture = np.zeros((sectors, PHOTOMETRY)), 0.0  # positive where clutter is predicted
-    shaded = False
+    shaded, last, shortened = False, np.zeros(2), 1.0
     used, used_starts = thinned(pixels, starts, _COARSE_STRIDE)
     locate(used, s, a, frame)
     index = -2
@@ -97,7 +106,11 @@ def solve_outline(
             information, score, back, spread, stats, work,
         )  # fmt: skip
         if index >= 0:
+            before = step
             total, step = next_step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
+            before *= float(index > _COARSE_STEPS)
+            shortened = shorten(total, before, step, shortened)
+            last[0], last[1] = step_rad(step, s), step_in_deviations(total, step, geometry)
             moved_by += step[:geometry]
             s, a = moved(s_there, a_there, frame, moved_by)
             blur += step[geometry:]
@@ -127,13 +140,14 @@ def solve_outline(
             photometry, spread, stats, ridge, mean, index - _COARSE_STEPS, geometry == 4,
             texture > 0.0, shaded,
         )  # fmt: skip
-        if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and step_rad(step, s) < _CONVERGED_RAD:
+        small = last[0] < _CONVERGED_RAD or last[1] < _CONVERGED_DEVIATIONS
+        if index >= _COARSE_STEPS + _LEARNING_STEPS - 1 and small:
             break
     model, scatter = covariances(total, information, score, frame, s)
     learnt = np.empty(KNOWN)
     learnt[:BLUR], learnt[BLUR] = blur, turn_rad
     learnt[BLUR + 1], learnt[BLUR + 2] = noise[0, 0], np.mean(noise[:, 1]) + texture
-    return s, a, blur, photometry, stats, noise, model, scatter, step, learnt
+    return s, a, blur, photometry, stats, noise, model, scatter, last, learnt
 
 
 @jit

@@ -8,12 +8,41 @@ from estimator.image.limb_edge import BLUR, PHOTOMETRY
 from estimator.image.limb_linear import cholesky, solve_column, solve_fixed
 from estimator.jit import jit
 
+_SHORTEST = 3.0  # steps that go to and fro are shortened up to so many times
+
 
 @jit
 def step_rad(step: FloatArray, s: FloatArray) -> float:
     """How far a step of the geometry moves the outline, seen from the camera."""
     turn = abs(step[1]) + abs(step[2])
     return float(turn + abs(step[0]) / (s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
+
+
+@jit
+def step_in_deviations(total: FloatArray, step: FloatArray, geometry: int) -> float:
+    """The geometry's part of a step over its standard deviation, were the blur known."""
+    square = 0.0
+    for i in range(geometry):
+        for j in range(geometry):
+            square += step[i] * total[i, j] * step[j]
+    return float(np.sqrt(max(square, 0.0)))
+
+
+@jit
+def shorten(total: FloatArray, before: FloatArray, step: FloatArray, shortened: float) -> float:
+    """Divide ``step`` by what the step ``before``, divided by ``shortened``, was too long.
+
+    Steps that only go to and fro then end in the middle. Returns what it was divided by.
+    """
+    back = square = 0.0
+    for i in range(step.shape[0]):
+        for j in range(step.shape[0]):
+            back -= step[i] * total[i, j] * before[j]
+            square += before[i] * total[i, j] * before[j]
+    if square > 0.0:
+        shortened = min(max(shortened + back / square, 1.0), _SHORTEST)
+        step /= shortened
+    return shortened
 
 
 @jit
