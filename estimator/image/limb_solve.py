@@ -108,7 +108,8 @@ def solve_outline(
         if index >= 0:
             before = step
             total, step = next_step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
-            before *= float(index > _COARSE_STEPS)
+            if index <= _COARSE_STEPS:
+                before[:] = 0.0
             shortened = shorten(total, before, step, shortened)
             last[0], last[1] = step_rad(step, s), step_in_deviations(total, step, geometry)
             moved_by += step[:geometry]
