@@ -117,7 +117,7 @@ def _explain(recording: "Recording", done: "Replay", source: str, changed: bool)
         warn(f"error: {done.outcome.error}")
     if changed:
         return
-    difference = first_difference(done.recorded, done.replayed)
+    difference = first_difference(done.recorded, done.replayed, not recording.log.finished)
     if difference and source == "images" and done.config.log.images == "jpeg":
         warn(f"the images were recorded as JPEG, which does not keep every bit: {difference}")
     elif difference:

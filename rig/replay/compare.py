@@ -8,12 +8,22 @@ from estimator.estimate import Estimate
 from rig.replay.engine import Kept
 
 
-def first_difference(recorded: Kept, replayed: Kept) -> str:
-    """Where the two part, in words; "" when every bit is the same."""
+# Written after what they come from: a log that was cut off may lack these of its last tick.
+_CUT_OFF = 2
+
+
+def first_difference(recorded: Kept, replayed: Kept, cut_off: bool = False) -> str:
+    """Where the two part, in words; "" when every bit is the same.
+
+    Of a log that is ``cut_off``, what the last tick would have recorded may be missing.
+    """
     for name, a, b in (
         ("update", recorded.updates, replayed.updates),
         ("prediction", recorded.predictions, replayed.predictions),
     ):
+        missing = len(b) - len(a)
+        if cut_off and 0 < missing <= _CUT_OFF:
+            b = b[: len(a)]
         for number, (one, other) in enumerate(zip_longest(a, b)):
             if one is None or other is None:
                 return f"{len(a)} {name}s were recorded, {len(b)} come from the replay"

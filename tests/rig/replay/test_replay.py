@@ -58,6 +58,16 @@ def test_the_comparison_sees_the_smallest_difference(bench: Bench) -> None:
     assert first_difference(done.recorded, done.replayed).startswith("update 40 ")
 
 
+def test_a_log_cut_off_amid_a_tick_may_lack_what_that_tick_said(tmp_path: Path) -> None:
+    make_bench(tmp_path, ["run.duration_s=1"]).run()
+    done = replay(open_recording(tmp_path))
+    del done.recorded.updates[-1:], done.recorded.predictions[-1:]
+    assert first_difference(done.recorded, done.replayed, cut_off=True) == ""
+    assert "recorded" in first_difference(done.recorded, done.replayed)
+    del done.recorded.updates[-2:]
+    assert "recorded" in first_difference(done.recorded, done.replayed, cut_off=True)
+
+
 def test_another_gain_gives_what_a_run_with_it_would_have_given(
     bench: Bench, tmp_path: Path
 ) -> None:
