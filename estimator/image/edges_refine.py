@@ -11,8 +11,9 @@ from estimator.image.intrinsics import FloatArray, Intrinsics
 from estimator.image.limb_fit import LimbFit, refine_cylinder, refine_sphere
 from estimator.jit import jit
 
-# Edge points sit up to 0.3 px off on shaded and motion-blurred outlines, the refinement does not.
-_MOST_SHIFT_PX, _MOST_SHIFT_PER_EXPECTED = 0.2, 4.0
+# Edge points sit up to 0.35 px off on shaded and motion-blurred outlines, most on small ones; the
+# refinement does not.
+_MOST_SHIFT_PX, _MOST_SHIFT_PER_EXPECTED = 0.5, 4.0
 _LEAST_USABLE, _MOST_CHI2 = 0.6, 4.0
 # Clean, refined cylinders with sides along the pixel grid were 0.003 to 0.009 px off (5 images).
 _GRID_PX = 0.01
@@ -49,7 +50,9 @@ def refined(
     # Sides along the pixel grid can leave the refinement without a solution; edges that are all
     # there and agree closely still measure, less precisely.
     if clear:
-        covariance = _edge_covariance(fit, intrinsics.fx_px)
+        settled = limb if limb is not None and limb.converged else None
+        apart_px = max(_SYSTEMATIC_PX, *_shifts_px(settled, camera, fit))
+        covariance = _edge_covariance(fit, intrinsics.fx_px, apart_px)
         return Measurement(Feature(fit.s, covariance, fit.axis)), None
     return Measurement(None, doubt), None
 
@@ -70,16 +73,20 @@ def _limb_doubt(limb: LimbFit | None, camera: FloatArray, fit: EdgeFit) -> str:
         return f"only {limb.usable_fraction:.0%} of the outline's pixels fit a target's edge"
     if limb.chi2 > _MOST_CHI2:
         return "the outline's pixels depart from a target's edge"
-    if limb.axis is None:
-        shifts = [cone_shift_px(camera, fit.outlines[0].normals, limb.s)]
-    else:
-        lines = lines_of_cylinder(limb.s, limb.axis)
-        sides = zip(fit.outlines, lines, strict=True)
-        shifts = [line_shift_px(camera, edges.normals, n) for edges, n in sides]
-    for edges, shift_px in zip(fit.outlines, shifts, strict=True):
+    for edges, shift_px in zip(fit.outlines, _shifts_px(limb, camera, fit), strict=True):
         if not shift_px <= _MOST_SHIFT_PX + _MOST_SHIFT_PER_EXPECTED * edges.expected_px:
             return "the outline's edges and pixels disagree on where it is"
     return ""
+
+
+def _shifts_px(limb: LimbFit | None, camera: FloatArray, fit: EdgeFit) -> list[float]:
+    """How far each of the fitted outlines lies from its refinement, at most; 0 without one."""
+    if limb is None:
+        return [0.0 for _ in fit.outlines]
+    if limb.axis is None:
+        return [cone_shift_px(camera, fit.outlines[0].normals, limb.s)]
+    sides = zip(fit.outlines, lines_of_cylinder(limb.s, limb.axis), strict=True)
+    return [line_shift_px(camera, edges.normals, n) for edges, n in sides]
 
 
 @jit
@@ -105,9 +112,9 @@ def _grid_covariance(
     return cylinder_covariance(n1, n2, spread[0], spread[1])
 
 
-def _edge_covariance(fit: EdgeFit, focal_px: float) -> FloatArray:
+def _edge_covariance(fit: EdgeFit, focal_px: float, systematic_px: float) -> FloatArray:
     """The edges' covariance (3, 3) with what shading and blur may have moved them by."""
-    angle = _SYSTEMATIC_PX / focal_px
+    angle = systematic_px / focal_px
     if fit.axis is not None:
         n1, n2 = lines_of_cylinder(fit.s, fit.axis)
         spread = [angle**2 * (np.eye(3) - np.outer(n, n)) for n in (n1, n2)]
