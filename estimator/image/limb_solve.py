@@ -42,7 +42,7 @@ _GEOMETRY_STEPS, _COARSE_STEPS, _LEARNING_STEPS, _ALL_STEPS = 1, 3, 2, 9
 _SHADING_STEPS = 5  # the first of these is left out: it finds the blur
 # The last step is this small, or this small a part of the standard deviation: each is about a
 # fifth of the one before it.
-_CONVERGED_RAD, _CONVERGED_DEVIATIONS = 1e-5, 0.5
+_CONVERGED_RAD, _CONVERGED_DEVIATIONS = 1e-5, 0.7
 _CLUTTER_MARGIN_PX = 0.5  # what the outline may be off where clutter is predicted
 _LEAST_TEXTURE = 1e-3
 _NO_SLOPE = 100.0  # inverse variance of what a prediction leaves of the background's slope
@@ -108,8 +108,7 @@ def solve_outline(
         if index >= 0:
             before = step
             total, step = next_step(information, score, blur, geometry, index < _GEOMETRY_STEPS)
-            if index <= _COARSE_STEPS:
-                before[:] = 0.0
+            before *= int(index > _COARSE_STEPS)
             shortened = shorten(total, before, step, shortened)
             last[0], last[1] = step_rad(step, s), step_in_deviations(total, step, geometry)
             moved_by += step[:geometry]

@@ -7,7 +7,6 @@ import numpy as np
 from estimator.estimate import Estimate
 from rig.replay.engine import Kept
 
-
 # Written after what they come from: a log that was cut off may lack these of its last tick.
 _CUT_OFF = 2
 
