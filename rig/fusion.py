@@ -68,6 +68,7 @@ class Fusion:
         # Sightings wait here until the arm has reported the motion up to their exposure.
         self._waiting: deque[Sighting] = deque()
         self._periods_s: deque[float] = deque(maxlen=_PERIODS)
+        self._period_s: float | None = None
         self._newest_image: tuple[int, float] | None = None  # seq and exposure instant
         self._twist_covariance: FloatArray | None = None  # as the arm last reported it
         self._doubt = ""
@@ -142,7 +143,7 @@ class Fusion:
     @property
     def image_period_s(self) -> float | None:
         """The camera's period as its stamps show it, drops left aside; None: not known yet."""
-        return float(np.median(self._periods_s)) if self._periods_s else None
+        return self._period_s
 
     def _corrected(self, sighting: Sighting) -> Sighting:
         frame, feature = sighting.frame, sighting.measurement.feature
@@ -157,6 +158,7 @@ class Fusion:
             passed_s = t_s - self._newest_image[1]
             if passed_s > 0.0:
                 self._periods_s.append(passed_s / (seq - self._newest_image[0]))
+                self._period_s = float(np.median(self._periods_s))
         self._newest_image = (seq, t_s)
 
     def _note_uncertainty(self, state: ArmState) -> None:
